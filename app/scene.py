@@ -1,0 +1,303 @@
+"""What is rendered: frozen data, free of files, windows and GPUs.
+
+A `Scene` says what there is, `RenderSettings` how to compute it; with a size
+they make a `Shot`, which determines an image completely. Window, snapshots,
+`shot` and `bench` all render a `Shot`.
+
+Everything is a frozen, slotted dataclass of numbers, strings and tuples, so
+``==`` compares values and unchanged parts are shared between edits
+(`dataclasses.replace`). Units: metres, radians, linear Rec. 709 radiance in
+W m^-2 sr^-1. Degrees exist only in scene files and panels.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+Vec2: TypeAlias = tuple[float, float]
+Vec3: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+FillRule: TypeAlias = Literal["evenodd", "nonzero"]
+ToneMap: TypeAlias = Literal["agx", "aces", "reinhard", "none"]
+
+FILL_RULES: tuple[FillRule, ...] = ("evenodd", "nonzero")
+TONE_MAPS: tuple[ToneMap, ...] = ("agx", "aces", "reinhard", "none")
+BUILT_IN_MESHES = ("plane", "sphere", "disc", "box")
+
+ALPHA_MIN = 1e-3
+"""Smallest GGX alpha the techniques are specified and tested for."""
+
+MAX_SAMPLES = 65536
+MAX_IMAGE_SIDE = 16384
+
+
+class SceneError(ValueError):
+    """A value that a scene cannot hold. The message is one sentence for the user."""
+
+
+def _finite(owner: str, field: str, values: tuple[float, ...], length: int) -> None:
+    if len(values) != length:
+        raise SceneError(f"{owner}: {field} has {len(values)} numbers, expected {length}")
+    if not all(math.isfinite(x) for x in values):
+        raise SceneError(f"{owner}: {field} is {values}, expected finite numbers")
+
+
+def _non_negative(owner: str, field: str, values: Vec3, upper: float = math.inf) -> None:
+    _finite(owner, field, values, 3)
+    if not all(0.0 <= x <= upper for x in values):
+        bound = "0 or more" if math.isinf(upper) else f"between 0 and {upper:g}"
+        raise SceneError(f"{owner}: {field} is {values}, expected numbers {bound}")
+
+
+def _cross(a: Vec3, b: Vec3) -> Vec3:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A perspective camera; ``fov_y`` is the full vertical angle in radians."""
+
+    eye: Vec3 = (0.0, 1.2, 4.0)
+    target: Vec3 = (0.0, 0.8, 0.0)
+    up: Vec3 = (0.0, 1.0, 0.0)
+    fov_y: float = math.radians(45.0)
+
+    def __post_init__(self) -> None:
+        for field in ("eye", "target", "up"):
+            _finite("camera", field, getattr(self, field), 3)
+        forward = (
+            self.target[0] - self.eye[0],
+            self.target[1] - self.eye[1],
+            self.target[2] - self.eye[2],
+        )
+        if not any(forward):
+            raise SceneError(f"camera: target equals eye {self.eye}, expected two different points")
+        side = math.hypot(*_cross(forward, self.up))
+        if side <= 1e-6 * math.hypot(*forward) * math.hypot(*self.up) or not any(self.up):
+            raise SceneError(
+                f"camera: up {self.up} is parallel to the view direction, expected another direction"
+            )
+        if not math.radians(1.0) <= self.fov_y <= math.radians(170.0):
+            raise SceneError(
+                f"camera: fov_y is {math.degrees(self.fov_y):g} degrees, expected between 1 and 170"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Lambert plus GGX. ``f0`` is Schlick's normal-incidence reflectance, f90 = 1.
+
+    ``alpha`` is (alpha_x, alpha_y), GGX's parameters along tangent and
+    bitangent, from `ALPHA_MIN` to 1; ``rotation`` turns the tangent about the
+    normal, in radians.
+    """
+
+    name: str
+    diffuse: Vec3 = (0.5, 0.5, 0.5)
+    f0: Vec3 = (0.04, 0.04, 0.04)
+    alpha: Vec2 = (0.25, 0.25)
+    rotation: float = 0.0
+
+    def __post_init__(self) -> None:
+        owner = f"material '{self.name}'"
+        _non_negative(owner, "diffuse", self.diffuse, 1.0)
+        _non_negative(owner, "f0", self.f0, 1.0)
+        _finite(owner, "alpha", self.alpha, 2)
+        if not all(ALPHA_MIN <= a <= 1.0 for a in self.alpha):
+            raise SceneError(
+                f"{owner}: alpha is {self.alpha}, expected numbers between {ALPHA_MIN:g} and 1"
+            )
+        _finite(owner, "rotation", (self.rotation,), 1)
+
+    @property
+    def is_anisotropic(self) -> bool:
+        return self.alpha[0] != self.alpha[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """Scale, then rotate (unit quaternion w, x, y, z), then translate."""
+
+    translate: Vec3 = (0.0, 0.0, 0.0)
+    rotate: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    scale: Vec3 = (1.0, 1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        _finite("transform", "translate", self.translate, 3)
+        _finite("transform", "rotate", self.rotate, 4)
+        _finite("transform", "scale", self.scale, 3)
+        norm = math.hypot(*self.rotate)
+        if abs(norm - 1.0) > 1e-3:
+            raise SceneError(
+                f"transform: rotate {self.rotate} has length {norm:g}, expected a unit quaternion"
+            )
+        if not all(self.scale):
+            raise SceneError(f"transform: scale is {self.scale}, expected no zero")
+
+
+@dataclass(frozen=True, slots=True)
+class SceneObject:
+    """A mesh in the world: ``mesh`` is a built-in name or an absolute file path."""
+
+    name: str
+    mesh: str
+    material: str
+    transform: Transform = Transform()
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """The points origin + s u + t v; u x v points to the emitting side."""
+
+    origin: Vec3 = (0.0, 1.0, 0.0)
+    u: Vec3 = (1.0, 0.0, 0.0)
+    v: Vec3 = (0.0, 1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for field in ("origin", "u", "v"):
+            _finite("plane", field, getattr(self, field), 3)
+        area = math.hypot(*_cross(self.u, self.v))
+        if area <= 1e-9 * math.hypot(*self.u) * math.hypot(*self.v):
+            raise SceneError(
+                f"plane: u {self.u} and v {self.v} are parallel or zero, "
+                "expected two independent directions"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class PolygonContour:
+    """A closed polygon in plane coordinates (s, t), any winding."""
+
+    points: tuple[Vec2, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.points) < 3:
+            raise SceneError(f"polygon has {len(self.points)} points, expected 3 or more")
+        for i, point in enumerate(self.points):
+            _finite("polygon", f"point {i}", point, 2)
+
+
+Contour: TypeAlias = PolygonContour
+"""One closed curve of an outline. Bézier contours join this union."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """Closed contours whose inside is decided by ``fill_rule``; holes are contours."""
+
+    contours: tuple[Contour, ...]
+    fill_rule: FillRule = "evenodd"
+
+    def __post_init__(self) -> None:
+        if not self.contours:
+            raise SceneError("outline has no contours, expected one or more")
+        if self.fill_rule not in FILL_RULES:
+            raise SceneError(
+                f"outline: fill_rule is '{self.fill_rule}', expected one of {', '.join(FILL_RULES)}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class AreaLight:
+    """A planar light that emits constant radiance towards u x v, or to both sides.
+
+    ``visible`` says whether the camera sees the light itself.
+    """
+
+    name: str
+    outline: Outline
+    plane: Plane = Plane()
+    radiance: Vec3 = (1.0, 1.0, 1.0)
+    two_sided: bool = False
+    visible: bool = True
+
+    def __post_init__(self) -> None:
+        _non_negative(f"light '{self.name}'", "radiance", self.radiance)
+
+
+@dataclass(frozen=True, slots=True)
+class Display:
+    """From linear radiance to the screen: exposure in stops, then the tone map."""
+
+    exposure: float = 0.0
+    tone_map: ToneMap = "agx"
+
+    def __post_init__(self) -> None:
+        _finite("display", "exposure", (self.exposure,), 1)
+        if not -32.0 <= self.exposure <= 32.0:
+            raise SceneError(f"display: exposure is {self.exposure:g}, expected between -32 and 32")
+        if self.tone_map not in TONE_MAPS:
+            raise SceneError(
+                f"display: tone_map is '{self.tone_map}', expected one of {', '.join(TONE_MAPS)}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything in a scene file. Names are unique within their kind."""
+
+    materials: tuple[Material, ...] = ()
+    objects: tuple[SceneObject, ...] = ()
+    lights: tuple[AreaLight, ...] = ()
+    camera: Camera = Camera()
+    display: Display = Display()
+
+    def __post_init__(self) -> None:
+        for kind, items in (
+            ("materials", self.materials),
+            ("objects", self.objects),
+            ("lights", self.lights),
+        ):
+            names = [item.name for item in items]
+            for name in names:
+                if names.count(name) > 1:
+                    raise SceneError(
+                        f"{kind}: the name '{name}' is used twice, expected unique names"
+                    )
+        known = {material.name for material in self.materials}
+        for item in self.objects:
+            if item.material not in known:
+                raise SceneError(
+                    f"object '{item.name}': material '{item.material}' is not among the scene's "
+                    f"materials ({', '.join(sorted(known)) or 'none'})"
+                )
+
+    def material_of(self, item: SceneObject) -> Material:
+        return next(m for m in self.materials if m.name == item.material)
+
+
+@dataclass(frozen=True, slots=True)
+class RenderSettings:
+    """How to compute the picture: technique by name, and samples per pixel.
+
+    One sample is exactly the pixel centre.
+    """
+
+    technique: str = "ltc"
+    samples: int = 1
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.samples <= MAX_SAMPLES:
+            raise SceneError(f"samples is {self.samples}, expected between 1 and {MAX_SAMPLES}")
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A scene, settings and a size in pixels: one image, completely determined."""
+
+    scene: Scene
+    settings: RenderSettings = RenderSettings()
+    width: int = 1280
+    height: int = 720
+
+    def __post_init__(self) -> None:
+        for field in ("width", "height"):
+            value = getattr(self, field)
+            if not 1 <= value <= MAX_IMAGE_SIDE:
+                raise SceneError(f"{field} is {value}, expected between 1 and {MAX_IMAGE_SIDE}")
