@@ -26,7 +26,7 @@ FILL_RULES: tuple[FillRule, ...] = ("evenodd", "nonzero")
 TONE_MAPS: tuple[ToneMap, ...] = ("agx", "aces", "reinhard", "none")
 BUILT_IN_MESHES = ("plane", "sphere", "disc", "box")
 
-ALPHA_MIN = 1e-3
+ALPHA_MIN = 1e-4
 """Smallest GGX alpha the techniques are specified and tested for."""
 
 MAX_SAMPLES = 65536
@@ -81,7 +81,8 @@ class Camera:
         side = math.hypot(*_cross(forward, self.up))
         if side <= 1e-6 * math.hypot(*forward) * math.hypot(*self.up) or not any(self.up):
             raise SceneError(
-                f"camera: up {self.up} is parallel to the view direction, expected another direction"
+                f"camera: up {self.up} is parallel to the view direction, "
+                "expected another direction"
             )
         if not math.radians(1.0) <= self.fov_y <= math.radians(170.0):
             raise SceneError(
