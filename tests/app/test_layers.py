@@ -1,0 +1,114 @@
+"""The direction of dependencies: window -> panels -> editor -> scene; window -> render -> ltc.
+
+Reads the imports of every module, in functions too, and fails on an upward
+arrow.
+"""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+GL = {"moderngl", "moderngl_window", "glcontext", "OpenGL"}
+GUI = {"imgui_bundle", "glfw", "implot", "imguizmo"}
+PURE = {
+    "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.errors", "app.vectors",
+    "app.edits", "app.editor", "app.materials", "app.camera_control",
+}  # fmt: skip
+WINDOW = {"app.window", "app.viewport", "app.dialogs", "app.messages", "app.theme"}
+
+
+def modules() -> dict[str, Path]:
+    found = {}
+    for package in ("ltc", "app"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+            found[name] = path
+    return found
+
+
+MODULES = modules()
+
+
+def imports(name: str) -> set[str]:
+    """Return the modules that a module imports, type-checking ones left out."""
+    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
+    typing_only = {
+        inner
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+        for child in node.body
+        for inner in ast.walk(child)
+    }
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if node in typing_only:
+            continue
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                package = name.split(".")
+                if MODULES[name].name != "__init__.py":
+                    package = package[:-1]
+                base = ".".join([*package[: len(package) - node.level + 1], *filter(None, [base])])
+            found.add(base)
+            found |= {f"{base}.{alias.name}" for alias in node.names} & set(MODULES)
+    return found
+
+
+def touches(found: set[str], names: set[str]) -> set[str]:
+    return {
+        item for item in found if any(item == name or item.startswith(name + ".") for name in names)
+    }
+
+
+def forbidden(name: str) -> set[str]:
+    if name.split(".")[0] == "ltc":
+        return {"app"} | GL | GUI
+    if name in PURE:
+        return {"app.render", "app.context", "app.panels"} | WINDOW | GL | GUI
+    if name.startswith("app.render"):
+        return {"app.panels", "app.editor", "app.edits", "moderngl_window"} | WINDOW | GUI
+    if name.startswith("app.panels"):
+        return {"app.render", "app.context", "glfw"} | WINDOW | GL
+    if name == "app.context":
+        return {"app.render", "app.panels", "app.editor"} | WINDOW | GUI
+    return set()
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_no_arrow_points_upwards(name: str) -> None:
+    upward = touches(imports(name), forbidden(name))
+    assert not upward, f"{name} imports {', '.join(sorted(upward))}"
+
+
+def test_scene_needs_nothing_of_this_program() -> None:
+    assert not touches(imports("app.scene"), {"app", "ltc"})
+
+
+def test_ltc_needs_only_numpy_and_scipy() -> None:
+    import sys
+
+    outside = {
+        item.split(".")[0] for name in MODULES if name.startswith("ltc") for item in imports(name)
+    } - set(sys.stdlib_module_names)
+    allowed = {"ltc", "numpy", "scipy"}
+    command_line = {"rich"}
+    assert outside <= allowed | command_line
+
+
+def test_the_check_sees_an_upward_arrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bad = tmp_path / "bad.py"
+    bad.write_text("def f():\n    from app import window\n    import moderngl.x\n")
+    monkeypatch.setitem(MODULES, "app.panels.bad", bad)
+    assert touches(imports("app.panels.bad"), forbidden("app.panels.bad")) == {
+        "app.window",
+        "moderngl.x",
+    } & (imports("app.panels.bad"))
+    assert "moderngl.x" in imports("app.panels.bad")
