@@ -255,17 +255,18 @@ class Scene:
             ("objects", self.objects),
             ("lights", self.lights),
         ):
-            names = [item.name for item in items]
-            for name in names:
-                if names.count(name) > 1:
+            names: set[str] = set()
+            for item in items:
+                if item.name in names:
                     raise SceneError(
-                        f"{kind}: the name '{name}' is used twice, expected unique names"
+                        f"{kind}: the name '{item.name}' is used twice, expected unique names"
                     )
+                names.add(item.name)
         known = {material.name for material in self.materials}
-        for item in self.objects:
-            if item.material not in known:
+        for drawn in self.objects:
+            if drawn.material not in known:
                 raise SceneError(
-                    f"object '{item.name}': material '{item.material}' is not among the scene's "
+                    f"object '{drawn.name}': material '{drawn.material}' is not among the scene's "
                     f"materials ({', '.join(sorted(known)) or 'none'})"
                 )
 
