@@ -1,0 +1,221 @@
+// Form factor of planar outlines under a linear transform, in float32 that
+// survives far, tiny, huge and edge-on lights. Twin: ltc.polygon.
+//
+// The contour sum is Lambert's: an edge from p to q adds theta w_z / |w|, with
+// w = p x q and theta = atan2(|w|, p . q). What keeps it exact:
+//   - Outlines stay in the light's plane, as (s, t) about an anchor g. With c the
+//     transformed way from the point to g, w = ds (c x U) + dt (c x V) + m (U x V)
+//     for an edge (ds, dt) of 2D moment m = a x b about the anchor. The anchor of a
+//     near light is the foot of the point on its plane, so an edge that passes close
+//     by has a small m instead of a small difference of large numbers; the normals
+//     are transformed by the cofactor matrix, whose last row is the lobe's axis,
+//     instead of crossing transformed vectors.
+//   - A light small against its distance is pinned to its own centre: the sum of w_z
+//     over a closed outline is twice its projected area exactly, so only differences
+//     1/|r|^2 - 1/|c|^2 are integrated, by quadrature. (Relative error of a unit quad
+//     30,000 away: 54 with arccosines, .008 unpinned, 2e-7 so.)
+//   - Below the horizon of the cosine the contour is replaced by its azimuth, edge by
+//     edge, with no state between edges; where an edge crosses the horizon, the
+//     crossing's direction is w x z.
+
+#include "ltc/lobe.glsl"
+
+// A transformed light: points are center + s u + t v, (s, t) about the anchor.
+struct CosineLight {
+    vec3 center;
+    vec3 u;
+    vec3 v;
+    vec3 center_cross_u;
+    vec3 center_cross_v;
+    vec3 u_cross_v;
+    vec2 anchor;      // in the light's own (s, t)
+    vec2 anchor_low;
+    float pin;        // 1/W(center) where pinned, else 0; W = x^2 + y^2 + max(z, 0)^2
+};
+
+struct ContourSum {
+    float angle;      // sum of signed edge terms
+    float area;       // twice the clipped area in (s, t)
+    float top;        // largest z met
+};
+
+// atan2(y, x) for y >= 0, in [0, pi]. Least-squares minimax fit of atan(r)/r on
+// [0, 1], relative error 2e-7 in float32.
+float positive_atan2(float y, float x)
+{
+    float ax = abs(x);
+    float r = min(y, ax) / max(max(y, ax), 1e-37);
+    float r2 = r * r;
+    float p = -0.00469326321;
+    p = p * r2 + 0.024252357;
+    p = p * r2 - 0.0594863296;
+    p = p * r2 + 0.0991428792;
+    p = p * r2 - 0.140194789;
+    p = p * r2 + 0.199697241;
+    p = p * r2 - 0.333319902;
+    p = p * r2 + 0.999999881;
+    float angle = r * p;
+    angle = y > ax ? 1.57079632679 - angle : angle;
+    return x < 0.0 ? 3.14159265359 - angle : angle;
+}
+
+// a.x b.y - a.y b.x to about one unit in the last place (Kahan): fma returns the
+// rounding error of the product that the other fma has to cancel.
+float cross_2d(vec2 a, vec2 b)
+{
+    float w = a.y * b.x;
+    float e = fma(-a.y, b.x, w);
+    return fma(a.x, b.y, -w) + e;
+}
+
+// a . b as an unevaluated sum (high, low): every product and sum keeps its rounding
+// error (Ogita, Rump and Oishi 2005, Dot2). `a_low` adds to a.
+vec2 accurate_dot(vec3 a, vec3 a_low, vec3 b)
+{
+    precise float p0 = a.x * b.x;
+    precise float p1 = a.y * b.y;
+    precise float p2 = a.z * b.z;
+    precise float s1 = p0 + p1;
+    precise float t1 = s1 - p0;
+    precise float e1 = (p0 - (s1 - t1)) + (p1 - t1);
+    precise float s2 = s1 + p2;
+    precise float t2 = s2 - s1;
+    precise float e2 = (s1 - (s2 - t2)) + (p2 - t2);
+    float e0 = fma(a.x, b.x, -p0) + fma(a.y, b.y, -p1) + fma(a.z, b.z, -p2);
+    precise float e = e0 + (e1 + e2) + dot(a_low, b);
+    precise float high = s2 + e;
+    precise float low = e - (high - s2);
+    return vec2(high, low);
+}
+
+// Where a light's plane stands to a surface point, (s, t) in the light's basis [m].
+struct PlaneView {
+    vec3 offset;     // from the point to the light's origin, world
+    vec2 foot;       // of the point on the plane
+    vec2 foot_low;   // what rounding took from it
+    float depth;     // of the plane along u x v; negative where the light shows its face
+};
+
+// Compensated, because a light's outline near the foot is known no better than the
+// foot: the error at alpha = .001 falls by a third, beside huge lights by more.
+PlaneView plane_view(vec3 position, vec3 origin, vec3 u, vec3 v)
+{
+    precise vec3 offset = origin - position;
+    precise vec3 back = origin - offset;
+    precise vec3 low = (origin - (offset + back)) + (back - position);
+    vec2 s = accurate_dot(offset, low, u);
+    vec2 t = accurate_dot(offset, low, v);
+    float depth = accurate_dot(offset, low, cross(u, v)).x;
+    return PlaneView(offset, -vec2(s.x, t.x), -vec2(s.y, t.y), depth);
+}
+
+// Lambert's term of an edge from p to q, w = p x q, the part below z = 0 replaced by
+// its azimuth. Where w underflows the edge subtends nothing float32 can tell from 0.
+float edge_angle(vec3 p, vec3 q, vec3 w)
+{
+    float w2 = dot(w, w);
+    if (w2 < 1e-36) {
+        return 0.0;
+    }
+    float inv = inversesqrt(w2);
+    float unit_z = w.z * inv;
+    float length_w = w2 * inv;
+    if (min(p.z, q.z) >= 0.0) {
+        return unit_z * positive_atan2(length_w, dot(p, q));
+    }
+    float sign_z = w.z < 0.0 ? -1.0 : 1.0;
+    // An edge within a milliradian of the horizon's plane counts as lying in it, at
+    // 1e-7 of cost: where it crosses would be noise.
+    if (max(p.z, q.z) <= 0.0 || dot(w.xy, w.xy) < 1e-6 * w2) {
+        return sign_z * positive_atan2(abs(w.z), dot(p.xy, q.xy));
+    }
+    // The edge meets z = 0 in the direction descending * (w.y, -w.x): the part above
+    // spans the angle to it, the part below the azimuth.
+    bool descending = p.z > 0.0;
+    vec3 high = descending ? p : q;
+    vec3 low = descending ? q : p;
+    vec2 crossing = descending ? vec2(w.y, -w.x) : vec2(-w.y, w.x);
+    return unit_z * positive_atan2(high.z * length_w, dot(high.xy, crossing)) +
+           sign_z * positive_atan2(abs(low.z * w.z), dot(low.xy, crossing));
+}
+
+// 1/W(r) - pin, r = center + d, in difference form.
+float pinned_weight(CosineLight light, vec3 d)
+{
+    vec3 c = light.center;
+    vec3 r = c + d;
+    float top = max(r.z, 0.0);
+    float base = max(c.z, 0.0);
+    float excess = dot(d.xy, r.xy + c.xy) + (top - base) * (top + base);
+    return -excess * light.pin / (dot(r.xy, r.xy) + top * top);
+}
+
+// Integral of the pinned form over an edge: 3 Gauss-Legendre nodes. The pin is
+// used within |d| < 0.2 |c|, where they err by less than 1e-7 of the result.
+float pinned_edge(CosineLight light, vec3 dp, vec3 dq, float w_z)
+{
+    vec3 middle = 0.5 * (dp + dq);
+    vec3 offset = 0.387298335 * (dq - dp);
+    float sum = 0.277777778 * (pinned_weight(light, middle - offset) +
+                               pinned_weight(light, middle + offset)) +
+                0.444444444 * pinned_weight(light, middle);
+    return w_z * sum;
+}
+
+// Add the edge from a to a + d; `moment` is a x d. All about the anchor.
+void add_edge(CosineLight light, vec2 a, vec2 b, vec2 d, float moment, inout ContourSum sum)
+{
+    vec3 dp = a.x * light.u + a.y * light.v;
+    vec3 dq = b.x * light.u + b.y * light.v;
+    vec3 p = light.center + dp;
+    vec3 q = light.center + dq;
+    vec3 w = d.x * light.center_cross_u + d.y * light.center_cross_v + moment * light.u_cross_v;
+    sum.top = max(sum.top, max(p.z, q.z));
+    if (light.pin > 0.0) {
+        sum.area += moment;
+        sum.angle += pinned_edge(light, dp, dq, w.z);
+    } else {
+        sum.angle += edge_angle(p, q, w);
+    }
+}
+
+CosineLight cosine_light(
+    CosineTransform transform, PlaneView view, vec3 u, vec3 v, float radius)
+{
+    CosineLight light;
+    light.u = transform.points * u;
+    light.v = transform.points * v;
+    vec3 n = cross(u, v);
+    light.u_cross_v = transform.normals * n;
+    vec3 c = transform.points * view.offset;
+    float c2 = dot(c, c);
+    float extent2 = radius * radius * (dot(light.u, light.u) + dot(light.v, light.v));
+    if (extent2 < 0.04 * c2) {
+        light.anchor = vec2(0.0);
+        light.anchor_low = vec2(0.0);
+        light.center = c;
+        light.center_cross_u = transform.normals * cross(view.offset, u);
+        light.center_cross_v = transform.normals * cross(view.offset, v);
+        // Where W(center) is below half |center|^2 all of the light is below z = 0.
+        float top = max(c.z, 0.0);
+        light.pin = 1.0 / max(dot(c.xy, c.xy) + top * top, 0.5 * c2);
+    } else {
+        light.anchor = view.foot;
+        light.anchor_low = view.foot_low;
+        light.center = transform.points * (view.depth * n);
+        light.center_cross_u = view.depth * (transform.normals * v);
+        light.center_cross_v = -view.depth * (transform.normals * u);
+        light.pin = 0.0;
+    }
+    return light;
+}
+
+// Form factor from the sum over the closed, clipped outline; positive for
+// outlines counter-clockwise about +z.
+float form_factor(CosineLight light, ContourSum sum)
+{
+    if (sum.top <= 0.0) {
+        return 0.0;
+    }
+    return 0.159154943 * (sum.angle + sum.area * light.u_cross_v.z * light.pin);
+}
