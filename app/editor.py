@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from app import edits
 from app.scene import AreaLight, Camera, Scene, SceneObject
 
 Kind: TypeAlias = Literal["none", "light", "object"]
@@ -68,6 +69,35 @@ def same_but_camera(a: Scene, b: Scene) -> bool:
         and a.materials == b.materials
         and a.display == b.display
     )
+
+
+def duplicate_selected(scene: Scene, selection: Selection) -> tuple[Scene, Selection]:
+    """Copy what is selected and select the copy."""
+    if selection.kind == "light":
+        scene, index = edits.duplicate_light(scene, selection.index)
+        return scene, Selection.light(index)
+    if selection.kind == "object":
+        scene, index = edits.duplicate_object(scene, selection.index)
+        return scene, Selection.object(index)
+    return scene, selection
+
+
+def remove_selected(scene: Scene, selection: Selection) -> tuple[Scene, Selection]:
+    """Remove the selected corner, light or object.
+
+    Raises
+    ------
+    SceneError
+        If a light would keep fewer than three corners.
+    """
+    if selection.kind == "object":
+        return edits.remove_object(scene, selection.index), NOTHING
+    if selection.kind != "light":
+        return scene, selection
+    if selection.vertex is None:
+        return edits.remove_light(scene, selection.index), NOTHING
+    light = edits.remove_vertex(scene.lights[selection.index], selection.vertex)
+    return edits.replace_light(scene, selection.index, light), replace(selection, vertex=None)
 
 
 class Editor:

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from app.scene import (
     AreaLight,
-    Camera,
     Material,
     Outline,
     Plane,
     PolygonContour,
+    Quaternion,
     Scene,
     SceneError,
     SceneObject,
@@ -481,9 +481,50 @@ def rename_material(scene: Scene, material: str, name: str) -> Scene:
     return replace_material(scene, material, replace(old, name=unique_name(name, taken)))
 
 
-def look(scene: Scene, camera: Camera) -> Scene:
-    """Look at the scene with another camera."""
-    return replace(scene, camera=camera)
+def transform_object(item: SceneObject, rigid: FloatArray) -> SceneObject:
+    """Return the object moved by a (4, 4) world matrix of rotation and translation."""
+    transform = item.transform
+    x, y, z = (rigid[:3, :3] @ transform.translate + rigid[:3, 3]).tolist()
+    turn = quaternion_of(rigid[:3, :3])
+    product = multiply_quaternions(turn, transform.rotate)
+    norm = math.hypot(*product)
+    w, i, j, k = (component / norm for component in product)
+    return replace(item, transform=replace(transform, translate=(x, y, z), rotate=(w, i, j, k)))
+
+
+def quaternion_of(rotation: FloatArray) -> Quaternion:
+    """Return the unit quaternion (w, x, y, z) of a (3, 3) rotation matrix (Shepperd 1978)."""
+    m = rotation
+    squares = np.array(
+        [
+            1.0 + m[0, 0] + m[1, 1] + m[2, 2],
+            1.0 + m[0, 0] - m[1, 1] - m[2, 2],
+            1.0 - m[0, 0] + m[1, 1] - m[2, 2],
+            1.0 - m[0, 0] - m[1, 1] + m[2, 2],
+        ]
+    )
+    products = np.array(
+        [
+            [0.0, m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+            [0.0, 0.0, m[1, 0] + m[0, 1], m[0, 2] + m[2, 0]],
+            [0.0, 0.0, 0.0, m[2, 1] + m[1, 2]],
+            [0.0, 0.0, 0.0, 0.0],
+        ]
+    )
+    products += products.T + np.diag(squares)
+    row = products[int(squares.argmax())]
+    w, x, y, z = (row / np.linalg.norm(row)).tolist()
+    return (w, x, y, z)
+
+
+def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Return the Hamilton product a b: the turn b, then a."""
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
 
 
 # --- names of steps --------------------------------------------------------

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app import edits, materials
-from app.editor import NOTHING, Editor, Selection
+from app import edits, sliders
+from app.editor import NOTHING, Editor, Selection, duplicate_selected, remove_selected
 from app.scene import (
     ALPHA_MIN,
     AreaLight,
@@ -24,7 +24,7 @@ from app.scene import (
     SceneError,
     SceneObject,
 )
-from app.vectors import cross, dot, length, normalize, subtract
+from app.vectors import cross, dot, length, normalize, rotate, subtract
 
 SQUARE = PolygonContour(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 LIGHT = AreaLight("key", Outline((SQUARE,)))
@@ -362,22 +362,59 @@ def test_steps_name_what_changed(after: Scene, name: str) -> None:
 def test_sliders_and_alpha_are_inverse_where_nothing_is_clamped(
     roughness: float, anisotropy: float
 ) -> None:
-    alpha = materials.alpha_from_sliders(roughness, anisotropy)
+    alpha = sliders.alpha_from_sliders(roughness, anisotropy)
     if min(alpha) > ALPHA_MIN and max(alpha) < 1.0:
-        back = materials.sliders_from_alpha(alpha)
+        back = sliders.sliders_from_alpha(alpha)
         assert back == pytest.approx((roughness, anisotropy), abs=1e-9)
 
 
 def test_alpha_is_roughness_squared_and_burleys_aspect() -> None:
-    assert materials.alpha_from_sliders(0.5) == (0.25, 0.25)
-    assert materials.alpha_from_sliders(0.0) == (ALPHA_MIN, ALPHA_MIN)
-    wide, narrow = materials.alpha_from_sliders(0.3, 1.0)
+    assert sliders.alpha_from_sliders(0.5) == (0.25, 0.25)
+    assert sliders.alpha_from_sliders(0.0) == (ALPHA_MIN, ALPHA_MIN)
+    wide, narrow = sliders.alpha_from_sliders(0.3, 1.0)
     assert wide / narrow == pytest.approx(10.0)
     assert wide * narrow == pytest.approx(0.3**4)
 
 
 @given(st.tuples(*[st.floats(0.0, 1.0)] * 3))
 def test_srgb_round_trip(colour) -> None:
-    there = materials.srgb_from_linear(colour)
-    assert materials.linear_from_srgb(there) == pytest.approx(colour, abs=1e-6)
+    there = sliders.srgb_from_linear(colour)
+    assert sliders.linear_from_srgb(there) == pytest.approx(colour, abs=1e-6)
     assert all(0.0 <= x <= 1.0 + 1e-12 for x in there)
+
+
+@given(st.tuples(*[st.floats(-3.0, 3.0)] * 3))
+def test_euler_angles_and_quaternions_describe_the_same_turn(angles) -> None:
+    quaternion = sliders.quaternion_from_euler(angles)
+    assert math.hypot(*quaternion) == pytest.approx(1.0)
+    again = sliders.quaternion_from_euler(sliders.euler_from_quaternion(quaternion))
+    assert abs(sum(a * b for a, b in zip(quaternion, again, strict=True))) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8)])
+@pytest.mark.parametrize("angle", [0.0, 0.3, 3.1, -2.0])
+def test_an_object_turned_by_a_matrix_turns_by_that_angle(axis, angle) -> None:
+    rigid = np.eye(4)
+    rigid[:3, :3] = np.array([rotate(e, axis, angle) for e in np.eye(3)]).T
+    rigid[:3, 3] = (1.0, 2.0, 3.0)
+    turned = edits.transform_object(SCENE.objects[1], rigid).transform
+    expected = (math.cos(angle / 2), *(math.sin(angle / 2) * a for a in axis))
+    assert abs(sum(a * b for a, b in zip(turned.rotate, expected, strict=True))) == pytest.approx(1)
+    assert turned.translate == (1.0, 2.0, 3.0)
+    twice = edits.transform_object(edits.transform_object(SCENE.objects[1], rigid), rigid)
+    doubled = (math.cos(angle), *(math.sin(angle) * a for a in axis))
+    product = sum(a * b for a, b in zip(twice.transform.rotate, doubled, strict=True))
+    assert abs(product) == pytest.approx(1.0)
+
+
+def test_what_is_selected_is_copied_and_removed() -> None:
+    scene, chosen = duplicate_selected(SCENE, Selection.light(0))
+    assert chosen == Selection.light(2)
+    scene, chosen = remove_selected(scene, chosen)
+    assert (scene, chosen) == (SCENE, NOTHING)
+    scene, chosen = remove_selected(SCENE, Selection.light(0, (0, 1)))
+    assert len(scene.lights[0].outline.contours[0].points) == 3
+    assert chosen == Selection.light(0)
+    scene, chosen = duplicate_selected(SCENE, Selection.object(1))
+    assert remove_selected(scene, chosen)[0] == SCENE
+    assert duplicate_selected(SCENE, NOTHING) == remove_selected(SCENE, NOTHING) == (SCENE, NOTHING)

@@ -1,4 +1,4 @@
-"""Between the sliders of the GUI and the numbers of a material.
+"""Between what sliders and pickers show and what the scene holds.
 
 A `Material` stores GGX's ``alpha``; people turn ``roughness``, which is
 perceptually more even, and ``anisotropy``. Colours are picked in sRGB and
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from app.scene import ALPHA_MIN, Vec2, Vec3
+from app.scene import ALPHA_MIN, Quaternion, Vec2, Vec3
 
 ROUGHNESS_MIN = math.sqrt(ALPHA_MIN)
 
@@ -70,3 +70,33 @@ def linear_from_srgb(colour: Vec3) -> Vec3:
         return x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4
 
     return (decode(colour[0]), decode(colour[1]), decode(colour[2]))
+
+
+def quaternion_from_euler(angles: Vec3) -> Quaternion:
+    """Return the unit quaternion (w, x, y, z) of turns about x, then y, then z [rad]."""
+    (cx, cy, cz) = (math.cos(a / 2.0) for a in angles)
+    (sx, sy, sz) = (math.sin(a / 2.0) for a in angles)
+    return (
+        cx * cy * cz + sx * sy * sz,
+        sx * cy * cz - cx * sy * sz,
+        cx * sy * cz + sx * cy * sz,
+        cx * cy * sz - sx * sy * cz,
+    )
+
+
+def euler_from_quaternion(rotate: Quaternion) -> Vec3:
+    """Return the turns about x, then y, then z [rad] of a quaternion of any length.
+
+    At y = +-90 degrees, where the other two turn about one axis, x is the angle
+    between them and z is 0.
+    """
+    norm = math.hypot(*rotate)
+    w, x, y, z = (component / norm for component in rotate)
+    sine = max(-1.0, min(1.0, 2.0 * (w * y - x * z)))
+    if abs(sine) > 1.0 - 1e-12:
+        return (2.0 * math.atan2(x, w), math.copysign(math.pi / 2.0, sine), 0.0)
+    return (
+        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        math.asin(sine),
+        math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )

@@ -1,0 +1,89 @@
+"""The panel of times, and of what the renderer does for the scene and leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui, implot
+
+from app.panels.widgets import MUTED, heading, hint, tooltip
+
+
+@dataclass(frozen=True, slots=True)
+class PlanLine:
+    """One thing that the renderer does, or does not, for the present scene."""
+
+    kind: str
+    name: str
+    reason: str
+    used: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What the panel shows.
+
+    Attributes
+    ----------
+    passes : (name, milliseconds) of the last picture, GPU time unless named otherwise
+    history : milliseconds of recent pictures, oldest first
+    gpu : name of the renderer
+    size : width and height of the picture in pixels
+    samples : samples gathered, and how many there will be
+    plan : what is compiled, allocated and loaded
+    """
+
+    passes: tuple[tuple[str, float], ...] = ()
+    history: Sequence[float] = field(default_factory=tuple)
+    gpu: str = ""
+    size: tuple[int, int] = (0, 0)
+    samples: tuple[int, int] = (0, 0)
+    plan: tuple[PlanLine, ...] = ()
+
+
+def performance_panel(report: Report) -> None:
+    """Draw the panel."""
+    hint(f"{report.gpu}\n{report.size[0]} × {report.size[1]} pixels")
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop
+    if report.passes and imgui.begin_table("passes", 2, flags):
+        for name, milliseconds in report.passes:
+            imgui.table_next_row()
+            imgui.table_next_column()
+            imgui.text(name)
+            imgui.table_next_column()
+            text = f"{milliseconds:.2f} ms"
+            room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
+            imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
+            imgui.text(text)
+        imgui.end_table()
+    if len(report.history) > 1:
+        _history(np.asarray(report.history, dtype=np.float64))
+    if report.plan:
+        heading("For this scene")
+        for line in report.plan:
+            mark = "•" if line.used else "–"
+            imgui.text_colored(MUTED, mark)
+            imgui.same_line()
+            if line.used:
+                imgui.text_wrapped(line.name)
+            else:
+                hint(f"no {line.name}")
+            tooltip(f"{line.kind}: {line.reason}")
+
+
+def _history(milliseconds: np.ndarray) -> None:
+    size = ImVec2(-1.0, imgui.get_font_size() * 5.0)
+    flags = implot.Flags_.canvas_only | implot.Flags_.no_inputs
+    if implot.begin_plot("##history", size, flags):
+        axis = implot.AxisFlags_.no_decorations
+        implot.setup_axes("", "", axis, implot.AxisFlags_.no_grid_lines)
+        implot.setup_axes_limits(
+            0.0, len(milliseconds) - 1, 0.0, 1.2 * float(milliseconds.max()) + 1e-3,
+            implot.Cond_.always,
+        )  # fmt: skip
+        implot.plot_shaded("##area", milliseconds)
+        implot.plot_line("##line", milliseconds)
+        implot.end_plot()
+    tooltip("Milliseconds per picture, the last ones to the right")

@@ -1,0 +1,46 @@
+"""The status bar and the line of help in the picture."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from app.editor import Selection
+from app.panels.widgets import MUTED
+from app.scene import Scene
+
+
+def help_line(scene: Scene, selection: Selection, tool: str) -> str:
+    """Return what a newcomer may do next, for what is selected and the tool in hand."""
+    if not scene.lights:
+        return "Add a light with + in the Scene panel"
+    if selection.kind == "light" and selection.vertex is not None:
+        return "Drag the corner · Delete removes it · click a dot between corners to add one"
+    if selection.kind == "light":
+        move = (
+            "drag the arrows to move the light" if tool == "move" else "drag the rings to turn it"
+        )
+        other = "E to rotate" if tool == "move" else "W to move"
+        return f"Drag corners to reshape · {move} · {other} · drag elsewhere to look around"
+    if selection.kind == "object":
+        return "Change its look under Material · drag to look around · F frames it"
+    return "Click a light to shape it, an object to change its material · drag to look around"
+
+
+def status_bar(text: str, samples: tuple[int, int], size: tuple[int, int], technique: str) -> None:
+    """Draw help on the left, the state of the picture on the right.
+
+    Parameters
+    ----------
+    text : str
+        See `help_line`.
+    samples : (int, int)
+        Samples per pixel gathered, and how many there will be.
+    size : (int, int)
+        Pixels.
+    """
+    imgui.text_colored(MUTED, text)
+    done, total = samples
+    state = f"{technique}    {size[0]} × {size[1]}    {done} of {total} samples"
+    width = imgui.calc_text_size(state).x
+    imgui.same_line(imgui.get_window_width() - width - imgui.get_font_size())
+    imgui.text_colored(MUTED, state)
