@@ -1,7 +1,7 @@
 """The isotropic table: axes, texel mapping, what a texel holds, load and save.
 
 This is the one place that knows them; ``shaders/ltc/table.glsl`` is the GPU's
-translation of `sample_baked`.
+translation of `sample_textures`.
 
 Axes
     Both run over [0, 1], nodes and texels at ``i / (size - 1)``, ends
@@ -23,26 +23,15 @@ What the file holds
     between nodes. Float32, 16 KB at most.
 
 What the GPU samples
-    At low alpha the lobe's direction follows the view, while the y axis
-    squeezes most views that are not grazing into few rows: no table
-    over (x, y) could hold M itself. So `bake` stores M relative to the mirror
-    direction, where what is left is smooth. With s = sqrt(1 - c^2) and
-    ``q = sqrt(alpha^2 s^2 + c^2)`` (the view's length after stretching by
-    alpha), up to a positive factor::
-
-        | M00  0  M02 |   | c  0  -s |   |  k00     0    s q k02 |
-        |  0  M11  0  | = | 0  1   0 | . |   0     q k11    0    | . diag(alpha, alpha, 1)
-        | M20  0  M22 |   | s  0   c |   | s k20/q  0      k22   |
-
-    texture 0 holds (k00, k02, k11, k20), texture 1 holds (k22, A, u, 0), and
-    ``B = A (1 - q u)^5``. All are O(1), smooth and bounded for alpha -> 0 at
-    every view: a mirror has k00 = 2, k02 = 0, k11 = 2, k20 = 0, k22 = 1, A = 1,
-    u = 1. The entries that change sign with the view carry the factor s, so
-    that what is left is even in the view and the lookup symmetric at normal
-    incidence. The third column has unit length in every texel.
-
-    The lookup is bilinear. The rotation by (c, s) is the mirror frame: its
-    third column (-s, 0, c) is the mirror direction, its first (c, 0, s).
+    The residual as stored, and (A, u) resampled to 64^2, both bilinearly
+    (`IsotropicTable.textures`); ``B = A (1 - q u)^5`` with
+    ``q = sqrt(alpha^2 s^2 + c^2)``, the view's length after stretching by alpha.
+    M0 is computed per pixel: about 70 operations, once for all lights, for 36 KB
+    of textures instead of 128 KB. Baking M itself into a 64^2 texture cannot
+    work, because at low alpha the lobe follows the view while the y axis squeezes
+    most views into few rows; baked relative to the mirror direction it
+    does, at an error of .002 in M that computing avoids. Resampling
+    (A, u) costs .0003 in A and .0009 in B at most (32^2: .0011, .0032).
 
 Shading
     A = integral of f cos(theta) with F = 1; B = the same with the weight
@@ -70,7 +59,7 @@ from scipy.interpolate import RectBivariateSpline
 from ltc.resources import resource_path
 
 FloatArray = NDArray[np.float64]
-Baked = tuple[NDArray[np.float32], NDArray[np.float32]]
+Textures = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 ALPHA_MIN = 1e-4
 """Smallest alpha that lookups tell apart; below, the lobe of ALPHA_MIN is used."""
@@ -79,7 +68,6 @@ FORMAT = "ltc-isotropic/1"
 """Value of ``format`` in the provenance of a file."""
 
 _ALPHA_LIMIT = 1e-6  # stands for alpha = 0 in the first column: entries differ by about as much
-_ROW_LIMIT = 1e-4  # stands for y = 0 where a baked entry is divided by s
 _TILT = 0.7  # see closed_form_guess
 
 
@@ -396,59 +384,37 @@ class IsotropicTable:
         A, u = _smooth(self.albedo, x, y), _smooth(self.fresnel, x, y)
         return A, A * (1.0 - np.minimum(stretched_length(a, c) * u, 1.0)) ** 5
 
-    def bake(self, size: int = 64) -> Baked:
-        """Return the two textures that the GPU samples.
+    def textures(self, albedo_size: int = 64) -> Textures:
+        """Return what the GPU samples bilinearly.
 
         Parameters
         ----------
-        size : int, >= 2
-            Texels on each axis.
+        albedo_size : int, >= 2
+            Texels on each axis of the second texture, which is resampled from
+            the bicubic one of the file.
 
         Returns
         -------
-        texture 0 : (size, size, 4) float32
-            (k00, k02, k11, k20); row: view, column: alpha.
-        texture 1 : (size, size, 4) float32
-            (k22, A, u, 0).
+        residual : (n, n, 4) float32
+            As stored; row: view, column: alpha.
+        albedo : (albedo_size, albedo_size, 2) float32
+            A and u.
         """
-        nodes = np.linspace(0.0, 1.0, size)
+        nodes = np.linspace(0.0, 1.0, albedo_size)
         x, y = np.broadcast_arrays(nodes[None, :], nodes[:, None])
-        a, c = alpha_and_cosine(x, np.maximum(y, _ROW_LIMIT))
-        M = self._matrix(a, c, x, y)
-        s, q = np.sqrt(1.0 - c * c), stretched_length(a, c)
-        first = (M[..., 0, 0] / a, M[..., 2, 0] / a)
-        third = (M[..., 0, 2], M[..., 2, 2])
-        zero = np.zeros_like(a)
-        matrices = np.stack(
-            [
-                c * first[0] + s * first[1],
-                (c * third[0] + s * third[1]) / (s * q),
-                M[..., 1, 1] / (a * q),
-                (c * first[1] - s * first[0]) * q / s,
-            ],
-            axis=-1,
-        )
-        rest = np.stack(
-            [
-                c * third[1] - s * third[0],
-                _smooth(self.albedo, x, y),
-                _smooth(self.fresnel, x, y),
-                zero,
-            ],
-            axis=-1,
-        )
-        return matrices.astype(np.float32), rest.astype(np.float32)
+        pair = np.stack([_smooth(self.albedo, x, y), _smooth(self.fresnel, x, y)], axis=-1)
+        return self.residual, pair.astype(np.float32)
 
 
-def sample_baked(
-    baked: Baked, alpha: ArrayLike, cos_theta: ArrayLike
+def sample_textures(
+    textures: Textures, alpha: ArrayLike, cos_theta: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (M, A, B) as the GPU looks them up in the textures of `bake`.
+    """Return (M, A, B) as the GPU looks them up.
 
     Parameters
     ----------
-    baked : pair of (size, size, 4) float32
-        From `IsotropicTable.bake`.
+    textures : pair of (n, n, 4) and (k, k, 2) float32
+        From `IsotropicTable.textures`.
     alpha, cos_theta : (...) float
         Clamped to [ALPHA_MIN, 1] and [0, 1].
 
@@ -466,36 +432,27 @@ def sample_baked(
 
     Notes
     -----
-    Twin: ``shaders/ltc/table.glsl``. In float32 take s from the length of the view's
-    tangential part, not from sqrt(1 - c^2), which loses 3e-4 rad at
-    normal incidence.
+    Twins: ``shaders/ltc/table.glsl`` and ``shaders/ltc/lobe.glsl``. In float32 take
+    s from the length of the view's tangential part, not from sqrt(1 - c^2), which
+    loses 3e-4 rad at normal incidence.
     """
-    matrices, rest = baked
-    if (
-        matrices.ndim != 3
-        or matrices.shape[0] != matrices.shape[1]
-        or matrices.shape[2] != 4
-        or rest.shape != matrices.shape
-    ):
-        raise ValueError(
-            f"baked textures have shapes {matrices.shape} and {rest.shape},"
-            " expected (size, size, 4) twice"
-        )
+    residual, albedo = textures
+    for name, texels, channels in (("residual", residual, 4), ("albedo", albedo, 2)):
+        if texels.ndim != 3 or texels.shape[0] != texels.shape[1] or texels.shape[2] != channels:
+            raise ValueError(
+                f"texture {name} has shape {texels.shape}, expected (n, n, {channels})"
+            )
     a = np.clip(np.asarray(alpha, dtype=np.float64), ALPHA_MIN, 1.0)
     c = np.clip(np.asarray(cos_theta, dtype=np.float64), 0.0, 1.0)
     a, c = np.broadcast_arrays(a, c)
     x, y = table_coordinates(a, c)
-    k = _interpolate(np.concatenate([matrices, rest], axis=-1), x, y)
-    k00, k02, k11, k20, k22, A, u = (k[..., i] for i in range(7))
-    s, q = np.sqrt(1.0 - c * c), stretched_length(a, c)
-    M = np.zeros((*a.shape, 3, 3))
-    K02, K20 = s * q * k02, s * k20 / q
-    M[..., 0, 0] = a * (c * k00 - s * K20)
-    M[..., 2, 0] = a * (s * k00 + c * K20)
-    M[..., 1, 1] = a * q * k11
-    M[..., 0, 2] = c * K02 - s * k22
-    M[..., 2, 2] = s * K02 + c * k22
-    return M, A, A * (1.0 - np.minimum(q * u, 1.0)) ** 5
+    s = np.sqrt(1.0 - c * c)
+    v = np.stack([s, np.zeros_like(c), c], axis=-1)
+    M = closed_form_guess(a, a, v) @ residual_matrix(_interpolate(residual, x, y), s)
+    pair = _interpolate(albedo, x, y)
+    A, u = pair[..., 0], pair[..., 1]
+    B = A * (1.0 - np.minimum(stretched_length(a, c) * u, 1.0)) ** 5
+    return M / np.linalg.norm(M[..., :, 2], axis=-1)[..., None, None], A, B
 
 
 def write_atomically(path: Path, data: bytes) -> None:
