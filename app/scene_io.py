@@ -19,11 +19,9 @@ ordinary ones stay short.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from decimal import Context, Decimal
@@ -32,6 +30,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from app.errors import InputError, describe, expected_one_of, nearest, os_reason, require_file
+from app.files import replace_file
 from app.meshes import check_mesh_path
 from app.scene import (
     BUILT_IN_MESHES,
@@ -132,7 +131,7 @@ def save_scene(scene: Scene, path: Path | str) -> None:
         raise InputError(
             f"{path}: a name in the scene holds half a character, expected valid text"
         ) from None
-    _replace_file(path, data)
+    replace_file(path, data, "a scene file")
 
 
 def demo_scenes() -> dict[str, Path]:
@@ -159,38 +158,6 @@ def _read_text(path: Path) -> str:
         raise InputError(
             f"{path}: byte {error.start} is {data[error.start]:#04x}, expected UTF-8 text"
         ) from None
-
-
-def _replace_file(path: Path, data: bytes) -> None:
-    """Write ``data`` to a temporary file beside ``path``, then rename it over ``path``."""
-    if path.is_dir():
-        raise InputError(f"{path}: this is a folder, expected the name of a scene file")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist, expected one that does")
-    temporary = None
-    try:
-        mode = path.stat().st_mode & 0o777 if path.exists() else None
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name[:100]}.", dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(_default_mode() if mode is None else mode)
-        Path(temporary).replace(path)
-    except OSError as error:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                Path(temporary).unlink()
-        raise InputError(
-            f"{path}: cannot be written ({os_reason(error)}), expected a writable place"
-        ) from error
-
-
-def _default_mode() -> int:
-    """Return the permissions that a newly created file would get."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
 
 
 # Reading
