@@ -1,0 +1,179 @@
+"""What the programs of a shot need, and nothing else.
+
+What changes a *value* is a uniform. What changes which instructions, textures or
+buffers exist is a feature here; what bounds an array is a feature rounded up to a
+power of two, so that adding a light rarely compiles anything. Needs that cannot
+matter are reset (two-sidedness without lights that shine, say): equal needs, equal
+program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+
+from app.errors import InputError
+from app.render.pack import MAX_INDEX, TEXELS_PER_LIGHT, TEXELS_PER_MATERIAL, light_geometry
+from app.scene import AreaLight, Material, Scene
+
+STORAGE_TEXTURE_WIDTH = 1024
+"""Texels in a row of the textures that hold lights or materials too many for a block."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a GL implementation allows. The defaults are the least that OpenGL 4.1 guarantees."""
+
+    uniform_block_bytes: int = 16384
+    texture_side: int = 16384
+
+    @classmethod
+    def of(cls, ctx: moderngl.Context) -> Limits:
+        info = ctx.info
+        viewport = info["GL_MAX_VIEWPORT_DIMS"]
+        return cls(
+            int(info["GL_MAX_UNIFORM_BLOCK_SIZE"]),
+            min(int(info["GL_MAX_TEXTURE_SIZE"]), *(int(side) for side in viewport)),
+        )
+
+    @property
+    def storage_texels(self) -> int:
+        """Most vec4 records that lights or materials may take."""
+        return min(MAX_INDEX, STORAGE_TEXTURE_WIDTH * self.texture_side)
+
+
+def _rounded(count: int) -> int:
+    """Return the power of two, at least 16, that holds ``count``."""
+    return max(16, 1 << (count - 1).bit_length()) if count else 0
+
+
+@dataclass(frozen=True, slots=True)
+class LightNeeds:
+    """The lights of a scene that reach surfaces.
+
+    ``uniform_texels`` is the uniform block's array length, 0 where the lights
+    need a texture (or there are none).
+    """
+
+    count: int
+    texels: int
+    one_sided: bool
+    two_sided: bool
+    uniform_texels: int
+
+    @classmethod
+    def of(cls, lights: Sequence[AreaLight], limits: Limits) -> LightNeeds:
+        """Raise `InputError` if the lights have more edges than the machine can hold."""
+        shining = [light for light in lights if any(light.radiance)]
+        edges = sum(len(light_geometry(light).edges) for light in shining)
+        texels = TEXELS_PER_LIGHT * len(lights) + edges
+        if texels > limits.storage_texels:
+            raise InputError(
+                f"lights: {len(lights)} lights with {edges} edges need {texels} records, "
+                f"expected at most {limits.storage_texels} on this machine"
+            )
+        rounded = _rounded(texels)
+        return cls(
+            len(lights),
+            texels,
+            any(not light.two_sided for light in shining),
+            any(light.two_sided for light in shining),
+            rounded if 16 * rounded <= limits.uniform_block_bytes else 0,
+        )
+
+    def defines(self) -> dict[str, int]:
+        return {
+            "HAS_ONE_SIDED": int(self.one_sided),
+            "HAS_TWO_SIDED": int(self.two_sided),
+            "LIGHT_STORAGE_UNIFORM": int(self.uniform_texels > 0),
+            "LIGHT_TEXELS": self.uniform_texels,
+            "STORAGE_TEXTURE_WIDTH": STORAGE_TEXTURE_WIDTH,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class LightingFeatures:
+    """What the lighting program of a scene needs.
+
+    Attributes
+    ----------
+    specular, diffuse : bool
+        Some object's material reflects so, and some light shines.
+    shapes : bool
+        Some light is visible to the camera.
+    accumulates : bool
+        The result is averaged with earlier samples.
+    lights : LightNeeds
+    uniform_materials : int
+        Array length of the material block, 0 where materials need a texture
+        (or nothing is shaded).
+    """
+
+    specular: bool
+    diffuse: bool
+    shapes: bool
+    accumulates: bool
+    lights: LightNeeds
+    uniform_materials: int
+
+    @classmethod
+    def of(cls, scene: Scene, samples: int, limits: Limits) -> LightingFeatures:
+        """Raise `InputError` if lights or objects are more than the machine can hold."""
+        lights = LightNeeds.of(scene.lights, limits)
+        shines = lights.one_sided or lights.two_sided
+        used = used_materials(scene)
+        if TEXELS_PER_MATERIAL * len(used) > limits.storage_texels:
+            raise InputError(
+                f"objects: there are {len(used)}, "
+                f"expected at most {limits.storage_texels // TEXELS_PER_MATERIAL} on this machine"
+            )
+        specular = shines and any(any(material.f0) for material in used)
+        diffuse = shines and any(any(material.diffuse) for material in used)
+        rounded = _rounded(TEXELS_PER_MATERIAL * len(used))
+        fits = (specular or diffuse) and 16 * rounded <= limits.uniform_block_bytes
+        return cls(
+            specular,
+            diffuse,
+            any(light.visible and len(light_geometry(light).edges) for light in scene.lights),
+            samples > 1,
+            lights,
+            rounded if fits else 0,
+        )
+
+    @property
+    def shades(self) -> bool:
+        """Whether any surface reflects any light."""
+        return self.specular or self.diffuse
+
+    @property
+    def lit(self) -> bool:
+        """Whether there is anything to see: without this no lighting program exists."""
+        return self.shades or self.shapes
+
+    def defines(self) -> dict[str, int]:
+        """Return the numbers that the lighting shaders are assembled with."""
+        lights = self.lights
+        if not self.shades:
+            lights = LightNeeds(lights.count, lights.texels, False, False, lights.uniform_texels)
+        return {
+            "HAS_SPECULAR": int(self.specular),
+            "HAS_DIFFUSE": int(self.diffuse),
+            "HAS_SHAPES": int(self.shapes),
+            "ACCUMULATES": int(self.accumulates),
+            "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
+            "MATERIAL_TEXELS": self.uniform_materials,
+            **lights.defines(),
+        }
+
+
+def probe_defines(lights: LightNeeds) -> dict[str, int]:
+    """Return the numbers that the probe's shaders are assembled with: a white, glossy material."""
+    return {"HAS_SPECULAR": 1, "HAS_DIFFUSE": 1, **lights.defines()}
+
+
+def used_materials(scene: Scene) -> tuple[Material, ...]:
+    """Return each object's material, in the order of the objects."""
+    by_name = {material.name: material for material in scene.materials}
+    return tuple(by_name[item.material] for item in scene.objects)

@@ -1,0 +1,194 @@
+"""The G-buffer pass: which surface each pixel sees, and where.
+
+One RGBA32F attachment holds (octahedral normal, depth along the view axis [m],
+id); the background's depth is 0. Ids: an object's index, or -1 - i for light i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from app.meshes import Mesh, load_mesh
+from app.render.camera import CameraFrame, normal_from_object, world_from_object
+from app.render.pack import pack_light_shapes
+from app.render.programs import Programs, ProgramSpec
+from app.render.state import begin_pass
+from app.scene import AreaLight, SceneObject
+
+OBJECTS = ProgramSpec.of("gbuffer", "passes/gbuffer.vert", "passes/gbuffer.frag")
+LIGHTS = ProgramSpec.of("light shapes", "passes/light_shape.vert", "passes/light_shape.frag")
+
+WHOLE_PICTURE = (1.0, 1.0, 0.0, 0.0)
+
+
+def mesh_bytes(mesh: Mesh) -> int:
+    """Return the bytes that a mesh takes on the GPU: positions, normals, indices."""
+    return 4 * (mesh.positions.size + mesh.normals.size + mesh.indices.size)
+
+
+def load_meshes(objects: Sequence[SceneObject]) -> dict[str, Mesh]:
+    """Return the meshes of objects by name, each once.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be loaded.
+    """
+    return {name: load_mesh(name) for name in dict.fromkeys(item.mesh for item in objects)}
+
+
+class _Vertices:
+    """Buffers, and their vertex array for whichever program draws them now."""
+
+    def __init__(
+        self, ctx: moderngl.Context, vertices: bytes, layout: str, indices: bytes | None = None
+    ) -> None:
+        self._ctx = ctx
+        self._layout = layout
+        self._vertices = ctx.buffer(vertices)
+        self._indices = None if indices is None else ctx.buffer(indices)
+        self._array: moderngl.VertexArray | None = None
+        self._program: moderngl.Program | None = None
+
+    def array(self, program: moderngl.Program) -> moderngl.VertexArray:
+        if self._array is None or self._program is not program:
+            if self._array is not None:
+                self._array.release()
+            locations = range(len(self._layout.split()))
+            self._array = self._ctx.vertex_array(
+                program,
+                [(self._vertices, self._layout, *locations)],
+                index_buffer=self._indices,
+                index_element_size=4,
+            )
+            self._program = program
+        return self._array
+
+    @property
+    def bytes(self) -> int:
+        return int(self._vertices.size + (self._indices.size if self._indices else 0))
+
+    def release(self) -> None:
+        for thing in (self._array, self._vertices, self._indices):
+            if thing is not None:
+                thing.release()
+
+
+@dataclass(frozen=True, eq=False)
+class _Instance:
+    mesh: str
+    world_from_object: NDArray[np.float64]
+    normal: bytes
+    front_sign: float
+
+
+class GBufferPass:
+    """Owner of the vertex buffers. ``uploads`` counts fillings of meshes and light shapes."""
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
+        self._ctx = ctx
+        self._programs = programs
+        self._meshes: dict[str, tuple[Mesh, _Vertices]] = {}
+        self._instances: list[_Instance] = []
+        self._shapes: _Vertices | None = None
+        self._shape_counts = (0, 0)
+        self.uploads = {"meshes": 0, "light shapes": 0}
+
+    def set_objects(self, objects: Sequence[SceneObject]) -> None:
+        """Hold the meshes of ``objects`` and no others.
+
+        Raises
+        ------
+        InputError
+            If a mesh cannot be loaded; what was held stays.
+        """
+        meshes = load_meshes(objects)
+        instances = []
+        for item in objects:
+            matrix = world_from_object(item.transform)
+            normal = normal_from_object(matrix).T.astype(np.float32).tobytes()
+            mirrors = np.linalg.det(matrix[:3, :3]) < 0.0
+            instances.append(_Instance(item.mesh, matrix, normal, -1.0 if mirrors else 1.0))
+        for name in list(self._meshes):
+            if self._meshes[name][0] is not meshes.get(name):
+                self._meshes.pop(name)[1].release()
+        for name, mesh in meshes.items():
+            if name not in self._meshes:
+                data = np.hstack([mesh.positions, mesh.normals], dtype=np.float32)
+                indices = mesh.indices.astype(np.uint32).tobytes()
+                vertices = _Vertices(self._ctx, data.tobytes(), "3f 3f", indices)
+                self._meshes[name] = (mesh, vertices)
+                self.uploads["meshes"] += 1
+        self._instances = instances
+
+    def set_lights(self, lights: Sequence[AreaLight]) -> None:
+        """Hold the triangles of the visible ones of ``lights``."""
+        if self._shapes is not None:
+            self._shapes.release()
+            self._shapes = None
+        shapes = pack_light_shapes(lights)
+        if len(shapes.vertices):
+            self._shapes = _Vertices(self._ctx, shapes.vertices.tobytes(), "3f 3f 1f")
+            self._shape_counts = (shapes.one_sided, len(shapes.vertices) - shapes.one_sided)
+            self.uploads["light shapes"] += 1
+
+    def draw(
+        self,
+        target: moderngl.Framebuffer,
+        frame: CameraFrame,
+        window: tuple[float, float, float, float] = WHOLE_PICTURE,
+    ) -> None:
+        """Draw what is held into ``target``, seen by ``frame``.
+
+        ``window`` is (scale x, scale y, offset x, offset y) of the normalised
+        device coordinates: which part of the picture the target shows.
+        """
+        ctx = begin_pass(target, target.size, depth=True)
+        target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        clip_from_world = frame.clip_from_world()
+        if self._instances:
+            program = self._programs.get(OBJECTS)
+            program["clip_window"].value = window
+            matrix, normal = program["clip_from_object"], program["world_from_object_normal"]
+            front, identity = program["front_sign"], program["object_id"]
+            for index, instance in enumerate(self._instances):
+                clip_from_object = clip_from_world @ instance.world_from_object
+                matrix.write(clip_from_object.T.astype(np.float32).tobytes())
+                normal.write(instance.normal)
+                front.value = instance.front_sign
+                identity.value = float(index)
+                self._meshes[instance.mesh][1].array(program).render()
+        if self._shapes is not None:
+            program = self._programs.get(LIGHTS)
+            program["clip_window"].value = window
+            program["clip_from_world"].write(clip_from_world.T.astype(np.float32).tobytes())
+            array = self._shapes.array(program)
+            one_sided, two_sided = self._shape_counts
+            if one_sided:
+                ctx.enable(moderngl.CULL_FACE)
+                array.render(vertices=one_sided)
+            if two_sided:
+                ctx.disable(moderngl.CULL_FACE)
+                array.render(vertices=two_sided, first=one_sided)
+
+    def allocated(self) -> dict[str, int]:
+        """Return the bytes of every buffer held, by name."""
+        held = {f"mesh {name}": vertices.bytes for name, (_, vertices) in self._meshes.items()}
+        if self._shapes is not None:
+            held["light shapes"] = self._shapes.bytes
+        return held
+
+    def release(self) -> None:
+        """Release every GPU object."""
+        for _, vertices in self._meshes.values():
+            vertices.release()
+        self._meshes.clear()
+        self._instances = []
+        if self._shapes is not None:
+            self._shapes.release()
+            self._shapes = None

@@ -1,0 +1,220 @@
+"""The lighting pass: from surfaces to radiance, by the technique's own shaders.
+
+It owns what shading reads: the lights, the materials, and the tables of a scene
+that has something glossy. The probe runs the very same functions on given points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from app.render.camera import CameraFrame
+from app.render.features import LightingFeatures, LightNeeds, probe_defines
+from app.render.pack import pack_lights, pack_materials
+from app.render.programs import Programs, ProgramSpec
+from app.render.state import FullScreenTriangle, begin_pass
+from app.render.storage import TexelStorage
+from app.render.tables import isotropic_textures
+from app.scene import AreaLight, Material
+
+# Texture units and uniform block bindings; each pass binds its own anew.
+SURFACES, HISTORY, LIGHTS, MATERIALS, TABLE_RESIDUAL, TABLE_ALBEDO = range(6)
+
+PROBE_SIDE = 1024
+"""Points are probed in pictures of at most this side."""
+
+
+def lighting_spec(features: LightingFeatures) -> ProgramSpec:
+    """Return the lighting program of a scene that has one."""
+    return ProgramSpec.of(
+        "lighting", "passes/fullscreen.vert", "passes/lighting.frag", features.defines()
+    )
+
+
+def probe_spec(lights: LightNeeds) -> ProgramSpec:
+    """Return the probe's program for a scene's lights."""
+    return ProgramSpec.of(
+        "probe", "passes/fullscreen.vert", "passes/probe.frag", probe_defines(lights)
+    )
+
+
+class LightingPass:
+    """Owner of lights, materials and tables on the GPU. ``uploads`` counts their fillings."""
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
+        self._ctx = ctx
+        self._programs = programs
+        self._lights = TexelStorage(ctx, "light", "Lights")
+        self._materials = TexelStorage(ctx, "material", "Materials")
+        self._tables: dict[str, moderngl.Texture] = {}
+        self._triangle = FullScreenTriangle(ctx)
+        self._light_count = 0
+
+    @property
+    def uploads(self) -> dict[str, int]:
+        return {"lights": self._lights.uploads, "materials": self._materials.uploads}
+
+    def set_lights(self, lights: Sequence[AreaLight], needs: LightNeeds) -> None:
+        """Hold the texels of ``lights``."""
+        self._light_count = len(lights)
+        self._lights.update(pack_lights(lights), needs.uniform_texels)
+
+    def set_materials(self, materials: Sequence[Material], uniform_texels: int) -> None:
+        """Hold one record per object."""
+        self._materials.update(pack_materials(materials), uniform_texels)
+
+    def drop(self, *, lights: bool = False, materials: bool = False, tables: bool = False) -> None:
+        """Release what the scene no longer needs."""
+        if lights:
+            self._lights.release()
+        if materials:
+            self._materials.release()
+        if tables:
+            for texture in self._tables.values():
+                texture.release()
+            self._tables.clear()
+
+    def load_tables(self) -> None:
+        """Hold the technique's tables."""
+        if self._tables:
+            return
+        for name, texels in zip(
+            ("table_residual", "table_albedo"), isotropic_textures(), strict=True
+        ):
+            height, width, channels = texels.shape
+            texture = self._ctx.texture((width, height), channels, texels.tobytes(), dtype="f4")
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._tables[name] = texture
+
+    def draw(
+        self,
+        target: moderngl.Framebuffer,
+        surfaces: moderngl.Texture,
+        features: LightingFeatures,
+        frame: CameraFrame,
+        offset: tuple[float, float],
+        history: moderngl.Texture | None,
+        sample: int,
+    ) -> None:
+        """Write the radiance of one sample, or its mean with ``history``, to ``target``.
+
+        Parameters
+        ----------
+        offset : (right, up)
+            Where in its pixel the G-buffer's sample lies, from the centre [pixels].
+        history : texture or None
+            The mean of the ``sample`` samples before this one.
+        """
+        width, height = target.size
+        begin_pass(target, target.size)
+        program = self._programs.get(lighting_spec(features))
+        _set(program, "surfaces", SURFACES)
+        surfaces.use(SURFACES)
+        if history is not None:
+            _set(program, "history", HISTORY)
+            history.use(HISTORY)
+        _set(program, "sample_weight", 1.0 / (sample + 1))
+        corner = (
+            frame.forward
+            + (2.0 * offset[0] / width - 1.0) * frame.right
+            + (2.0 * offset[1] / height - 1.0) * frame.up
+        )
+        _set(program, "eye", tuple(frame.eye))
+        _set(program, "ray_corner", tuple(corner))
+        _set(program, "ray_dx", tuple(2.0 / width * frame.right))
+        _set(program, "ray_dy", tuple(2.0 / height * frame.up))
+        self._bind_shading(program)
+        self._materials.bind(program, MATERIALS)
+        self._triangle.draw(program)
+
+    def probe(
+        self,
+        needs: LightNeeds,
+        position: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        view: NDArray[np.float32],
+        alpha: NDArray[np.float32],
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return (specular, diffuse), each (n, 3), of a white material at n points."""
+        program = self._programs.get(probe_spec(needs))
+        batch = PROBE_SIDE * PROBE_SIDE
+        pieces = [
+            self._probe_batch(program, [a[start : start + batch] for a in inputs])
+            for inputs in [(position, normal, view, alpha)]
+            for start in range(0, len(position), batch)
+        ]
+        empty = np.zeros((0, 3), dtype=np.float32)
+        specular = np.concatenate([empty, *(piece[0] for piece in pieces)])
+        diffuse = np.concatenate([empty, *(piece[1] for piece in pieces)])
+        return specular, diffuse
+
+    def _probe_batch(
+        self, program: moderngl.Program, inputs: list[NDArray[np.float32]]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        count = len(inputs[0])
+        width = min(count, PROBE_SIDE)
+        height = -(-count // width)
+        owned: list[moderngl.Texture | moderngl.Framebuffer] = []
+        try:
+            for unit, (name, values) in enumerate(
+                zip(("positions", "normals", "views", "alphas"), inputs, strict=True), start=6
+            ):
+                # Points that fill up the last row repeat the last one: all are valid.
+                filled = np.concatenate([values, values[-1:].repeat(width * height - count, 0)])
+                texture = self._ctx.texture(
+                    (width, height), values.shape[1], filled.tobytes(), alignment=4, dtype="f4"
+                )
+                owned.append(texture)
+                texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+                _set(program, name, unit)
+            outputs = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(2)]
+            owned += outputs
+            target = self._ctx.framebuffer(color_attachments=outputs)
+            owned.append(target)
+            begin_pass(target, (width, height))
+            for unit, texture in enumerate(owned[:4], start=6):
+                texture.use(unit)
+            self._bind_shading(program)
+            self._triangle.draw(program)
+            specular, diffuse = (
+                np.frombuffer(output.read(), dtype=np.float32).reshape(-1, 4)[:count, :3]
+                for output in outputs
+            )
+            return specular, diffuse
+        finally:
+            for thing in reversed(owned):
+                thing.release()
+
+    def _bind_shading(self, program: moderngl.Program) -> None:
+        _set(program, "light_count", self._light_count)
+        self._lights.bind(program, LIGHTS)
+        for unit, name in ((TABLE_RESIDUAL, "table_residual"), (TABLE_ALBEDO, "table_albedo")):
+            if name in program:
+                program[name].value = unit
+                self._tables[name].use(unit)
+
+    def allocated(self) -> dict[str, int]:
+        """Return the bytes of every buffer and table held, by name."""
+        held = {
+            name: storage.bytes
+            for name, storage in (("lights", self._lights), ("materials", self._materials))
+            if storage.bytes
+        }
+        for name, texture in self._tables.items():
+            held[name] = 4 * texture.components * texture.width * texture.height
+        return held
+
+    def release(self) -> None:
+        """Release every GPU object."""
+        self.drop(lights=True, materials=True, tables=True)
+        self._triangle.release()
+
+
+def _set(program: moderngl.Program, name: str, value: object) -> None:
+    """Set a uniform unless this variant of the program has none of that name."""
+    if name in program:
+        program[name].value = value

@@ -1,0 +1,556 @@
+"""The renderer: a `Shot` in, radiance and display colours out.
+
+It takes a context and knows neither window nor files, so the same shot gives the
+same bytes wherever it is drawn. What a shot needs is decided in one place
+(`app.render.plan`); here it is carried out, and a part of the scene is uploaded
+again only when it `is not` the object that was uploaded last.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.errors import InputError
+from app.render.camera import CameraFrame
+from app.render.features import LightNeeds, Limits, used_materials
+from app.render.gbuffer import GBufferPass
+from app.render.lighting import LightingPass
+from app.render.plan import Needs, Plan, make_plan, needs_of
+from app.render.post import DisplayPass
+from app.render.programs import Programs
+from app.render.sampling import pixel_offset
+from app.render.state import begin_pass
+from app.render.techniques import check_technique
+from app.render.timers import PassTimers
+from app.scene import Display, RenderSettings, Scene, Shot
+
+_BYTES_PER_PIXEL = {"RGBA32F": 16, "RGBA8": 4, "DEPTH24": 4}
+
+
+@dataclass(frozen=True)
+class Hit:
+    """What a pixel shows: ``index`` counts the scene's objects or lights."""
+
+    kind: Literal["object", "light"]
+    index: int
+    position_ws: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a G-buffer and its radiance depend on, with parts compared by identity first."""
+
+    shot: Shot
+
+    def same_radiance(self, other: Shot) -> bool:
+        mine = self.shot
+        if mine is other:
+            return True
+        a, b = mine.scene, other.scene
+        return (
+            (mine.width, mine.height) == (other.width, other.height)
+            and mine.settings.technique == other.settings.technique
+            and all(
+                getattr(a, part) is getattr(b, part) or getattr(a, part) == getattr(b, part)
+                for part in ("camera", "materials", "objects", "lights")
+            )
+        )
+
+
+class _Targets:
+    """The attachments of one size: made when first asked for, released together."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self.size = (0, 0)
+        self._textures: dict[str, moderngl.Texture] = {}
+        self._depth: moderngl.Renderbuffer | None = None
+        self._framebuffers: dict[str, moderngl.Framebuffer] = {}
+
+    def resize(self, size: tuple[int, int]) -> None:
+        if size != self.size:
+            self.release()
+            self.size = size
+
+    def texture(self, name: str) -> moderngl.Texture:
+        if name not in self._textures:
+            try:
+                if name == "display":
+                    texture = self._ctx.texture(self.size, 4)
+                else:
+                    texture = self._ctx.texture(self.size, 4, dtype="f4")
+            except moderngl.Error as error:
+                raise self._too_large(error) from error
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._textures[name] = texture
+        return self._textures[name]
+
+    def framebuffer(self, name: str, *, depth: bool = False) -> moderngl.Framebuffer:
+        if name not in self._framebuffers:
+            texture = self.texture(name)
+            try:
+                if depth and self._depth is None:
+                    self._depth = self._ctx.depth_renderbuffer(self.size)
+                self._framebuffers[name] = self._ctx.framebuffer(
+                    color_attachments=[texture], depth_attachment=self._depth if depth else None
+                )
+            except moderngl.Error as error:
+                raise self._too_large(error) from error
+        return self._framebuffers[name]
+
+    def _too_large(self, error: moderngl.Error) -> InputError:
+        return InputError(
+            f"size: the graphics driver cannot hold a picture of {self.size[0]}x{self.size[1]} "
+            f"({error}), expected a smaller one"
+        )
+
+    def keep_only(self, names: set[str]) -> None:
+        for name in [n for n in self._textures if n not in names]:
+            if name in self._framebuffers:
+                self._framebuffers.pop(name).release()
+            self._textures.pop(name).release()
+        if "gbuffer" not in names and self._depth is not None:
+            self._depth.release()
+            self._depth = None
+
+    def allocated(self) -> dict[str, int]:
+        pixels = self.size[0] * self.size[1]
+        held = {
+            name: pixels * _BYTES_PER_PIXEL["RGBA8" if name == "display" else "RGBA32F"]
+            for name in self._textures
+        }
+        if self._depth is not None:
+            held["depth"] = pixels * _BYTES_PER_PIXEL["DEPTH24"]
+        return held
+
+    def release(self) -> None:
+        for framebuffer in self._framebuffers.values():
+            framebuffer.release()
+        for texture in self._textures.values():
+            texture.release()
+        if self._depth is not None:
+            self._depth.release()
+        self._framebuffers.clear()
+        self._textures.clear()
+        self._depth = None
+        self.size = (0, 0)
+
+
+class Renderer:
+    """Renders shots with one OpenGL context.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+        OpenGL 4.1 or later; must be current whenever a method is called.
+
+    Notes
+    -----
+    Every method that renders may raise `InputError` (the scene asks for more
+    than the machine has, a mesh cannot be loaded, the technique is unknown) and
+    `ShaderError` (a changed shader does not compile).
+    """
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self.ctx = ctx
+        self.limits = Limits.of(ctx)
+        self.programs = Programs(ctx)
+        self.lighting_passes = 0
+        self._gbuffer = GBufferPass(ctx, self.programs)
+        self._lighting = LightingPass(ctx, self.programs)
+        self._display = DisplayPass(ctx, self.programs)
+        self._targets = _Targets(ctx)
+        self._pick_target: moderngl.Framebuffer | None = None
+        self._timers = PassTimers(ctx)
+        self._cpu_ms = 0.0
+        self._held: Scene | None = None
+        self._held_lights: tuple[object, int] | None = None
+        self._held_materials: tuple[object, object, int] | None = None
+        self._needs: Needs | None = None
+        self._seen: _Seen | None = None
+        self._samples = 0
+        self._newest = ""
+        self._displayed: Display | None = None
+
+    # Rendering
+
+    def render(self, shot: Shot) -> None:
+        """Render all samples of ``shot`` from scratch."""
+        self._begin(shot, shot.settings.samples)
+        for _ in range(shot.settings.samples):
+            self._add_sample()
+
+    def accumulate(self, shot: Shot, max_samples: int) -> int:
+        """Add one sample if ``shot`` shows what the last call showed, else start again.
+
+        Exposure and tone map do not count as a change. Nothing is drawn once
+        ``max_samples`` are there.
+
+        Returns
+        -------
+        int
+            Samples so far; ``max_samples`` means idle.
+        """
+        limit = max(1, max_samples)
+        restart = (
+            self._seen is None
+            or not self._seen.same_radiance(shot)
+            or (limit > 1 and self._needs is not None and not self._needs.accumulates)
+        )
+        if restart:
+            self._begin(shot, limit)
+        else:
+            self._seen = _Seen(shot)
+        if self._samples < limit:
+            self._add_sample()
+        return self._samples
+
+    def present(self, shot: Shot, framebuffer: moderngl.Framebuffer) -> None:
+        """Tone-map the radiance rendered last to ``framebuffer``, as ``shot`` wants it displayed.
+
+        The picture goes to the lower left corner, pixel by pixel.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        radiance = self._radiance_texture()
+        with self._timers.measure("display"):
+            self._display.draw(framebuffer, radiance, shot.scene.display)
+
+    def radiance(self) -> NDArray[np.float32]:
+        """Return the mean linear radiance (h, w, 3) float32, row 0 at the top.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        return _top_down(self._radiance_texture(), np.float32)
+
+    def display(self) -> NDArray[np.uint8]:
+        """Return the display colours (h, w, 3) uint8 sRGB, row 0 at the top.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        return _top_down(self.texture, np.uint8)
+
+    @property
+    def texture(self) -> moderngl.Texture:
+        """The display colours as an RGBA8 texture, row 0 at the bottom, up to date.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        radiance = self._radiance_texture()
+        assert self._seen is not None
+        wanted = self._seen.shot.scene.display
+        if self._displayed != wanted:
+            target = self._targets.framebuffer("display")
+            with self._timers.measure("display"):
+                self._display.draw(target, radiance, wanted)
+            self._displayed = wanted
+        return self._targets.texture("display")
+
+    # Questions
+
+    def pick(self, x: float, y: float) -> Hit | None:
+        """Return what the last shot shows at pixel coordinates from the top left, or None.
+
+        The middle of the top left pixel is (0.5, 0.5). The one point is drawn
+        again, so the answer does not depend on the samples' jitter.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        if self._seen is None:
+            raise RuntimeError("nothing was rendered yet")
+        shot = self._seen.shot
+        if not (0.0 <= x < shot.width and 0.0 <= y < shot.height):
+            return None
+        if self._pick_target is None:
+            self._pick_target = self.ctx.framebuffer(
+                color_attachments=[self.ctx.texture((1, 1), 4, dtype="f4")],
+                depth_attachment=self.ctx.depth_renderbuffer((1, 1)),
+            )
+        size = (shot.width, shot.height)
+        frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
+        ndc = (2.0 * x / shot.width - 1.0, 1.0 - 2.0 * y / shot.height)
+        window = (
+            float(shot.width),
+            float(shot.height),
+            -ndc[0] * shot.width,
+            -ndc[1] * shot.height,
+        )
+        self._hold_geometry(shot.scene)
+        self._gbuffer.draw(self._pick_target, frame, window)
+        surface = np.frombuffer(
+            self._pick_target.read(components=4, dtype="f4"), dtype=np.float32
+        ).astype(np.float64)
+        depth, identity = surface[2], int(surface[3])
+        if depth <= 0.0:
+            return None
+        position = frame.eye + depth * frame.ray(x, y, size)
+        place = (float(position[0]), float(position[1]), float(position[2]))
+        if identity >= 0:
+            return Hit("object", identity, place)
+        return Hit("light", -1 - identity, place)
+
+    def probe(
+        self,
+        scene: Scene,
+        settings: RenderSettings,
+        position: ArrayLike,
+        normal: ArrayLike,
+        tangent: ArrayLike,
+        view: ArrayLike,
+        alpha: ArrayLike,
+    ) -> dict[str, NDArray[np.float32]]:
+        """Return what points of a white material send to their viewers, by lobe.
+
+        Parameters
+        ----------
+        position, normal, tangent, view : (n, 3) float
+            World space; ``normal`` and ``view`` (to the viewer) unit.
+        alpha : (n, 2) float
+            GGX parameters along tangent and bitangent.
+
+        Returns
+        -------
+        dict
+            ``"specular"`` and ``"diffuse"``, (n, 3) float32 radiance: F = 1 and
+            albedo 1, summed over the scene's lights.
+
+        Raises
+        ------
+        ValueError
+            If a shape is wrong.
+        """
+        check_technique(settings.technique)
+        arrays = {}
+        for name, values, width in (
+            ("position", position, 3),
+            ("normal", normal, 3),
+            ("tangent", tangent, 3),
+            ("view", view, 3),
+            ("alpha", alpha, 2),
+        ):
+            array = np.ascontiguousarray(values, dtype=np.float32)
+            if array.ndim != 2 or array.shape[1] != width:
+                raise ValueError(f"{name} has shape {array.shape}, expected (n, {width})")
+            arrays[name] = array
+        count = len(arrays["position"])
+        for name, array in arrays.items():
+            if len(array) != count:
+                raise ValueError(f"{name} has {len(array)} rows, expected {count} as in position")
+        needs = LightNeeds.of(scene.lights, self.limits)
+        if not (needs.one_sided or needs.two_sided) or not count:
+            zero = np.zeros((count, 3), dtype=np.float32)
+            return {"specular": zero, "diffuse": zero.copy()}
+        self._hold_lights(scene, needs)
+        self._lighting.load_tables()
+        specular, diffuse = self._lighting.probe(
+            needs, arrays["position"], arrays["normal"], arrays["view"], arrays["alpha"]
+        )
+        return {"specular": specular, "diffuse": diffuse}
+
+    def timings(self) -> dict[str, float]:
+        """Return the last time of each pass [ms]: gbuffer, lighting, display, and cpu.
+
+        ``cpu`` is what submitting the last sample took here. `timing_source`
+        says where the others come from; passes that did not run are missing.
+        Where timer queries return nothing the renderer changes to the wall clock
+        from then on, and draws the last shot's first sample again for its figures.
+        """
+        figures = self._timers.milliseconds()
+        untrusted = self._timers.source == "timer queries" and not any(figures.values())
+        if figures and untrusted and self._seen is not None:
+            self._timers.use_wall_clock()
+            self.render(Shot(self._seen.shot.scene, RenderSettings(), *self._targets.size))
+            _ = self.texture
+            figures = self._timers.milliseconds()
+        return {**figures, "cpu": self._cpu_ms}
+
+    @property
+    def timing_source(self) -> str:
+        """``"timer queries"`` or ``"wall clock"``."""
+        return self._timers.source
+
+    def use_wall_clock(self) -> None:
+        """Time passes by the wall clock, each with a glFinish, from now on."""
+        self._timers.use_wall_clock()
+
+    def plan(self, shot: Shot) -> Plan:
+        """Return what rendering ``shot`` compiles, allocates and loads, and why."""
+        return make_plan(shot, self.limits, self.programs.roots)
+
+    def allocated(self) -> dict[str, int]:
+        """Return the bytes of every buffer, table and attachment held now, by name."""
+        return {
+            **self._targets.allocated(),
+            **self._gbuffer.allocated(),
+            **self._lighting.allocated(),
+        }
+
+    @property
+    def uploads(self) -> dict[str, int]:
+        """How often each part of a scene was sent to the GPU since the renderer was made."""
+        return {**self._gbuffer.uploads, **self._lighting.uploads}
+
+    # Housekeeping
+
+    def reload_shaders(self) -> bool:
+        """Read the shader files again; True if a program changed.
+
+        Raises
+        ------
+        ShaderError
+            If one does not compile: file, line and message. The last good
+            programs stay in use.
+        """
+        try:
+            changed = self.programs.reload()
+        finally:
+            self._seen = self._seen and None
+            self._displayed = None
+        return changed
+
+    def release(self) -> None:
+        """Release every GPU object. The renderer cannot be used afterwards."""
+        self._targets.release()
+        self._gbuffer.release()
+        self._lighting.release()
+        self._display.release()
+        self._timers.release()
+        self.programs.release()
+        if self._pick_target is not None:
+            self._pick_target.color_attachments[0].release()
+            self._pick_target.depth_attachment.release()
+            self._pick_target.release()
+            self._pick_target = None
+
+    # Within
+
+    def _begin(self, shot: Shot, samples: int) -> None:
+        """Hold what ``shot`` needs and forget earlier samples."""
+        start = time.perf_counter()
+        check_technique(shot.settings.technique)
+        side = max(shot.width, shot.height)
+        if side > self.limits.texture_side:
+            raise InputError(
+                f"size: {shot.width}x{shot.height} is too large for this machine, "
+                f"expected at most {self.limits.texture_side} pixels a side"
+            )
+        scene = shot.scene
+        needs = needs_of(scene, samples, self.limits)
+        features = needs.lighting
+        self._seen = None
+        if features.lit:
+            self._hold_geometry(scene)
+            self._hold_lights(scene, features.lights)
+        if features.shades:
+            self._hold_materials(scene, features.uniform_materials)
+        if features.specular:
+            self._lighting.load_tables()
+        self._lighting.drop(
+            lights=not features.lit, materials=not features.shades, tables=not features.specular
+        )
+        if not features.lit:
+            self._gbuffer.release()
+            self._held = self._held_lights = None
+            self._timers.forget("gbuffer")
+            self._timers.forget("lighting")
+        if not features.shades:
+            self._held_materials = None
+        self._targets.resize((shot.width, shot.height))
+        self._targets.keep_only({name for name, _ in needs.attachments} - {"depth"})
+        self._needs = needs
+        self._seen = _Seen(shot)
+        self._samples = 0
+        self._newest = ""
+        self._displayed = None
+        self._cpu_ms = 1e3 * (time.perf_counter() - start)
+
+    def _add_sample(self) -> None:
+        assert self._seen is not None
+        assert self._needs is not None
+        start = time.perf_counter()
+        shot, needs = self._seen.shot, self._needs
+        older = self._newest
+        newest = "radiance 2" if older == "radiance" and needs.accumulates else "radiance"
+        target = self._targets.framebuffer(newest)
+        if needs.lighting.lit:
+            frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
+            offset = pixel_offset(self._samples)
+            window = (1.0, 1.0, -2.0 * offset[0] / shot.width, -2.0 * offset[1] / shot.height)
+            surfaces = self._targets.framebuffer("gbuffer", depth=True)
+            with self._timers.measure("gbuffer"):
+                self._gbuffer.draw(surfaces, frame, window)
+            with self._timers.measure("lighting"):
+                self._lighting.draw(
+                    target,
+                    self._targets.texture("gbuffer"),
+                    needs.lighting,
+                    frame,
+                    offset,
+                    self._targets.texture(older) if older else None,
+                    self._samples,
+                )
+            self.lighting_passes += 1
+        else:
+            begin_pass(target, target.size)
+            target.clear()
+        self._newest = newest
+        self._samples += 1
+        self._displayed = None
+        self._cpu_ms = 1e3 * (time.perf_counter() - start)
+
+    def _hold_geometry(self, scene: Scene) -> None:
+        held = self._held
+        if held is None or held.objects is not scene.objects:
+            self._gbuffer.set_objects(scene.objects)
+        if held is None or held.lights is not scene.lights:
+            self._gbuffer.set_lights(scene.lights)
+        self._held = scene
+
+    def _hold_lights(self, scene: Scene, needs: LightNeeds) -> None:
+        held = self._held_lights
+        if held is None or held[0] is not scene.lights or held[1] != needs.uniform_texels:
+            self._lighting.set_lights(scene.lights, needs)
+            self._held_lights = (scene.lights, needs.uniform_texels)
+
+    def _hold_materials(self, scene: Scene, uniform_texels: int) -> None:
+        held = self._held_materials
+        if (
+            held is None
+            or held[0] is not scene.materials
+            or held[1] is not scene.objects
+            or held[2] != uniform_texels
+        ):
+            self._lighting.set_materials(used_materials(scene), uniform_texels)
+            self._held_materials = (scene.materials, scene.objects, uniform_texels)
+
+    def _radiance_texture(self) -> moderngl.Texture:
+        if self._seen is None or not self._newest:
+            raise RuntimeError("nothing was rendered yet")
+        return self._targets.texture(self._newest)
+
+
+def _top_down(texture: moderngl.Texture, dtype: type) -> NDArray:
+    width, height = texture.size
+    pixels = np.frombuffer(texture.read(alignment=4), dtype=dtype).reshape(height, width, 4)
+    return np.ascontiguousarray(pixels[::-1, :, :3])

@@ -1,0 +1,20 @@
+// G-buffer: (octahedral normal, depth along the view axis [m], id). An object's id
+// is its index. Surfaces have two sides: the normal is turned to the one in view.
+
+#include "common/depth.glsl"
+#include "common/octahedron.glsl"
+
+in vec3 normal_ws;
+
+uniform float object_id;
+uniform float front_sign;  // -1 where the transform mirrors, else 1
+
+layout(location = 0) out vec4 surface;
+
+void main()
+{
+    float side = gl_FrontFacing ? front_sign : -front_sign;
+    float depth = 1.0 / gl_FragCoord.w;
+    surface = vec4(octahedral_from_direction(normal_ws * side), depth, object_id);
+    gl_FragDepth = log_depth(depth);
+}

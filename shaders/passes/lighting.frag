@@ -1,0 +1,82 @@
+// G-buffer to radiance: surfaces shaded by all lights, visible lights by their own
+// radiance, nothing else. Alpha is coverage.
+
+#include "common/octahedron.glsl"
+#include "passes/light_storage.glsl"
+#if HAS_SPECULAR || HAS_DIFFUSE
+#include "passes/material_storage.glsl"
+#include "ltc/shade.glsl"
+#endif
+
+uniform sampler2D surfaces;
+#if ACCUMULATES
+uniform sampler2D history;
+uniform float sample_weight;  // 1 / samples so far, this one included
+#endif
+
+#if HAS_SPECULAR || HAS_DIFFUSE
+uniform vec3 eye;
+// A pixel's ray of unit depth is ray_corner + x ray_dx + y ray_dy, pixels from the
+// bottom left; the sample's offset within the pixel is in ray_corner.
+uniform vec3 ray_corner;
+uniform vec3 ray_dx;
+uniform vec3 ray_dy;
+uniform int light_count;
+#if HAS_SPECULAR
+uniform sampler2D table_residual;
+uniform sampler2D table_albedo;
+#endif
+
+// Interpolated normals may turn away at silhouettes, where the surface itself does
+// not: bend them back until the viewer is just above the horizon.
+vec3 facing_normal(vec3 normal, vec3 wo)
+{
+    const float least_cosine = 1e-4;
+    float cosine = dot(normal, wo);
+    return cosine >= least_cosine ? normal : normalize(normal + (least_cosine - cosine) * wo);
+}
+
+vec3 surface_radiance(vec4 surface)
+{
+    vec3 ray = ray_corner + gl_FragCoord.x * ray_dx + gl_FragCoord.y * ray_dy;
+    vec3 wo = -normalize(ray);
+    vec3 normal = facing_normal(direction_from_octahedral(surface.xy), wo);
+    vec3 position = eye + surface.z * ray;
+    MaterialSample material = material_of_object(int(surface.w));
+    return shade_lights(
+#if HAS_SPECULAR
+        table_residual, table_albedo,
+#endif
+        light_count, position, normal, wo, material);
+}
+#endif
+
+layout(location = 0) out vec4 radiance;
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec4 surface = texelFetch(surfaces, pixel, 0);
+    vec4 value = vec4(0.0);
+    if (surface.z > 0.0) {
+        value.a = 1.0;
+#if HAS_SHAPES
+        if (surface.w < 0.0) {
+            value.rgb = light_texel(4 * (-1 - int(surface.w)) + 3).rgb;
+        }
+#endif
+#if HAS_SPECULAR || HAS_DIFFUSE
+        if (surface.w >= 0.0) {
+            value.rgb = surface_radiance(surface);
+        }
+#endif
+    }
+#if ACCUMULATES
+    // The running mean, not a sum: its rounding errors die out instead of adding up.
+    if (sample_weight < 1.0) {
+        vec4 mean = texelFetch(history, pixel, 0);
+        value = mean + (value - mean) * sample_weight;
+    }
+#endif
+    radiance = value;
+}
