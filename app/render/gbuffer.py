@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from app.meshes import Mesh, load_mesh
 from app.render.camera import CameraFrame, normal_from_object, world_from_object
 from app.render.pack import pack_light_shapes
-from app.render.programs import Programs, ProgramSpec
+from app.render.programs import Programs, ProgramSpec, set_uniform, write_uniform
 from app.render.state import begin_pass
 from app.scene import AreaLight, SceneObject
 
@@ -83,7 +83,7 @@ class _Vertices:
 class _Instance:
     mesh: str
     world_from_object: NDArray[np.float64]
-    normal: bytes
+    normal: NDArray[np.float64]
     front_sign: float
 
 
@@ -111,7 +111,7 @@ class GBufferPass:
         instances = []
         for item in objects:
             matrix = world_from_object(item.transform)
-            normal = normal_from_object(matrix).T.astype(np.float32).tobytes()
+            normal = normal_from_object(matrix)
             mirrors = np.linalg.det(matrix[:3, :3]) < 0.0
             instances.append(_Instance(item.mesh, matrix, normal, -1.0 if mirrors else 1.0))
         for name in list(self._meshes):
@@ -153,20 +153,18 @@ class GBufferPass:
         clip_from_world = frame.clip_from_world()
         if self._instances:
             program = self._programs.get(OBJECTS)
-            program["clip_window"].value = window
-            matrix, normal = program["clip_from_object"], program["world_from_object_normal"]
-            front, identity = program["front_sign"], program["object_id"]
+            set_uniform(program, "clip_window", window)
             for index, instance in enumerate(self._instances):
                 clip_from_object = clip_from_world @ instance.world_from_object
-                matrix.write(clip_from_object.T.astype(np.float32).tobytes())
-                normal.write(instance.normal)
-                front.value = instance.front_sign
-                identity.value = float(index)
+                write_uniform(program, "clip_from_object", clip_from_object)
+                write_uniform(program, "world_from_object_normal", instance.normal)
+                set_uniform(program, "front_sign", instance.front_sign)
+                set_uniform(program, "object_id", float(index))
                 self._meshes[instance.mesh][1].array(program).render()
         if self._shapes is not None:
             program = self._programs.get(LIGHTS)
-            program["clip_window"].value = window
-            program["clip_from_world"].write(clip_from_world.T.astype(np.float32).tobytes())
+            set_uniform(program, "clip_window", window)
+            write_uniform(program, "clip_from_world", clip_from_world)
             array = self._shapes.array(program)
             one_sided, two_sided = self._shape_counts
             if one_sided:

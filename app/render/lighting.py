@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from app.render.camera import CameraFrame
 from app.render.features import LightingFeatures, LightNeeds, probe_defines
 from app.render.pack import pack_lights, pack_materials
-from app.render.programs import Programs, ProgramSpec
+from app.render.programs import Programs, ProgramSpec, set_uniform
 from app.render.state import FullScreenTriangle, begin_pass
 from app.render.storage import TexelStorage
 from app.render.tables import isotropic_textures
@@ -112,21 +112,21 @@ class LightingPass:
         width, height = target.size
         begin_pass(target, target.size)
         program = self._programs.get(lighting_spec(features))
-        _set(program, "surfaces", SURFACES)
+        set_uniform(program, "surfaces", SURFACES)
         surfaces.use(SURFACES)
         if history is not None:
-            _set(program, "history", HISTORY)
+            set_uniform(program, "history", HISTORY)
             history.use(HISTORY)
-        _set(program, "sample_weight", 1.0 / (sample + 1))
+        set_uniform(program, "sample_weight", 1.0 / (sample + 1))
         corner = (
             frame.forward
             + (2.0 * offset[0] / width - 1.0) * frame.right
             + (2.0 * offset[1] / height - 1.0) * frame.up
         )
-        _set(program, "eye", tuple(frame.eye))
-        _set(program, "ray_corner", tuple(corner))
-        _set(program, "ray_dx", tuple(2.0 / width * frame.right))
-        _set(program, "ray_dy", tuple(2.0 / height * frame.up))
+        set_uniform(program, "eye", tuple(frame.eye))
+        set_uniform(program, "ray_corner", tuple(corner))
+        set_uniform(program, "ray_dx", tuple(2.0 / width * frame.right))
+        set_uniform(program, "ray_dy", tuple(2.0 / height * frame.up))
         self._bind_shading(program)
         self._materials.bind(program, MATERIALS)
         self._triangle.draw(program)
@@ -159,6 +159,7 @@ class LightingPass:
         width = min(count, PROBE_SIDE)
         height = -(-count // width)
         owned: list[moderngl.Texture | moderngl.Framebuffer] = []
+        points: list[moderngl.Texture] = []
         try:
             for unit, (name, values) in enumerate(
                 zip(("positions", "normals", "views", "alphas"), inputs, strict=True), start=6
@@ -169,14 +170,15 @@ class LightingPass:
                     (width, height), values.shape[1], filled.tobytes(), alignment=4, dtype="f4"
                 )
                 owned.append(texture)
+                points.append(texture)
                 texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-                _set(program, name, unit)
+                set_uniform(program, name, unit)
             outputs = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(2)]
             owned += outputs
             target = self._ctx.framebuffer(color_attachments=outputs)
             owned.append(target)
             begin_pass(target, (width, height))
-            for unit, texture in enumerate(owned[:4], start=6):
+            for unit, texture in enumerate(points, start=6):
                 texture.use(unit)
             self._bind_shading(program)
             self._triangle.draw(program)
@@ -190,11 +192,11 @@ class LightingPass:
                 thing.release()
 
     def _bind_shading(self, program: moderngl.Program) -> None:
-        _set(program, "light_count", self._light_count)
+        set_uniform(program, "light_count", self._light_count)
         self._lights.bind(program, LIGHTS)
         for unit, name in ((TABLE_RESIDUAL, "table_residual"), (TABLE_ALBEDO, "table_albedo")):
             if name in program:
-                program[name].value = unit
+                set_uniform(program, name, unit)
                 self._tables[name].use(unit)
 
     def allocated(self) -> dict[str, int]:
@@ -212,9 +214,3 @@ class LightingPass:
         """Release every GPU object."""
         self.drop(lights=True, materials=True, tables=True)
         self._triangle.release()
-
-
-def _set(program: moderngl.Program, name: str, value: object) -> None:
-    """Set a uniform unless this variant of the program has none of that name."""
-    if name in program:
-        program[name].value = value

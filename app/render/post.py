@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import moderngl
 
-from app.render.programs import Programs, ProgramSpec
+from app.render.programs import Programs, ProgramSpec, set_uniform
 from app.render.state import FullScreenTriangle, begin_pass
 from app.scene import TONE_MAPS, Display
 
@@ -28,9 +28,9 @@ class DisplayPass:
         """Fill ``target`` from its lower left corner, pixel by pixel."""
         program = self._programs.get(display_spec(display))
         begin_pass(target, radiance.size)
-        program["radiance"].value = 0
+        set_uniform(program, "radiance", 0)
         radiance.use(0)
-        program["exposure_scale"].value = 2.0**display.exposure
+        set_uniform(program, "exposure_scale", 2.0**display.exposure)
         self._triangle.draw(program)
 
     def release(self) -> None:

@@ -10,8 +10,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from app.render.assemble import ShaderError, Source, assemble
 from ltc.resources import resource_path
@@ -153,3 +156,17 @@ def _shader_error(spec: ProgramSpec, sources: tuple[Source, Source], log: str) -
         return ShaderError(spec.name, 0, lines[-1] if lines else "does not link", log)
     file, line = source.locate(int(found["file"]), int(found["a"] or found["b"]))
     return ShaderError(file, line, found["message"].strip(), log)
+
+
+def set_uniform(program: moderngl.Program, name: str, value: Any) -> None:
+    """Set a uniform, unless this variant of the program has none of that name."""
+    member = program.get(name, None)
+    if isinstance(member, moderngl.Uniform):
+        member.value = value
+
+
+def write_uniform(program: moderngl.Program, name: str, matrix: NDArray[np.float64]) -> None:
+    """Set a matrix uniform from rows (n, n) float64."""
+    member = program.get(name, None)
+    if isinstance(member, moderngl.Uniform):
+        member.write(matrix.T.astype(np.float32).tobytes())

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import moderngl
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from app.errors import InputError
 from app.render.camera import CameraFrame
@@ -550,7 +550,7 @@ class Renderer:
         return self._targets.texture(self._newest)
 
 
-def _top_down(texture: moderngl.Texture, dtype: type) -> NDArray:
+def _top_down(texture: moderngl.Texture, dtype: DTypeLike) -> NDArray[Any]:
     width, height = texture.size
-    pixels = np.frombuffer(texture.read(alignment=4), dtype=dtype).reshape(height, width, 4)
-    return np.ascontiguousarray(pixels[::-1, :, :3])
+    pixels: NDArray[Any] = np.frombuffer(texture.read(alignment=4), dtype=dtype)
+    return np.ascontiguousarray(pixels.reshape(height, width, 4)[::-1, :, :3])

@@ -40,12 +40,9 @@ def begin_pass(
     """
     ctx: moderngl.Context = target.ctx
     target.viewport = (0, 0, *size)
-    target.scissor = None
-    target.color_mask = (
-        ((True,) * 4,) * len(target.color_attachments)
-        if len(target.color_attachments) > 1
-        else (True,) * 4
-    )
+    target.scissor = None  # type: ignore[assignment]  # the stub forgets that None disables
+    if len(target.color_attachments) <= 1:
+        target.color_mask = (True, True, True, True)
     target.depth_mask = True
     target.use()
     ctx.enable_only(moderngl.DEPTH_TEST if depth else moderngl.NOTHING)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.render.features import STORAGE_TEXTURE_WIDTH
+from app.render.programs import set_uniform
 
 
 def storage_bytes(texels: int, uniform_texels: int) -> int:
@@ -50,11 +51,12 @@ class TexelStorage:
 
     def bind(self, program: moderngl.Program, unit: int) -> None:
         """Make ``program`` read from here; ``unit`` is free for a texture and for a block."""
-        if self._buffer is not None and self.block in program:
-            program[self.block].binding = unit
+        block = program.get(self.block, None)
+        if self._buffer is not None and isinstance(block, moderngl.UniformBlock):
+            block.binding = unit
             self._buffer.bind_to_uniform_block(unit)
-        elif self._texture is not None and f"{self.name}_texels" in program:
-            program[f"{self.name}_texels"].value = unit
+        elif self._texture is not None:
+            set_uniform(program, f"{self.name}_texels", unit)
             self._texture.use(unit)
 
     @property

@@ -75,14 +75,14 @@ def agx(color: ArrayLike) -> FloatArray:
     x = (np.log2(np.maximum(v, 1e-10)) - AGX_MIN_EV) / (AGX_MAX_EV - AGX_MIN_EV)
     y = np.polyval(AGX_CONTRAST, np.clip(x, 0.0, 1.0))
     linear = np.maximum(y @ AGX_OUTSET.T, 0.0) ** 2.2
-    return np.clip(linear @ REC709_FROM_REC2020.T, 0.0, 1.0)
+    return np.asarray(np.clip(linear @ REC709_FROM_REC2020.T, 0.0, 1.0))
 
 
 def aces(color: ArrayLike) -> FloatArray:
     """Return Hill's fit of ACES."""
     v = np.asarray(color, dtype=np.float64) @ ACES_INTO.T
     fit = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081)
-    return np.clip(fit @ ACES_BACK.T, 0.0, 1.0)
+    return np.asarray(np.clip(fit @ ACES_BACK.T, 0.0, 1.0))
 
 
 def reinhard(color: ArrayLike) -> FloatArray:
