@@ -120,23 +120,26 @@ float edge_angle(vec3 p, vec3 q, vec3 w)
     float inv = inversesqrt(w2);
     float unit_z = w.z * inv;
     float length_w = w2 * inv;
+    float sign_z = w.z < 0.0 ? -1.0 : 1.0;
     if (min(p.z, q.z) >= 0.0) {
         return unit_z * positive_atan2(length_w, dot(p, q));
     }
-    float sign_z = w.z < 0.0 ? -1.0 : 1.0;
     // An edge within a milliradian of the horizon's plane counts as lying in it, at
     // 1e-7 of cost: where it crosses would be noise.
-    if (max(p.z, q.z) <= 0.0 || dot(w.xy, w.xy) < 1e-6 * w2) {
-        return sign_z * positive_atan2(abs(w.z), dot(p.xy, q.xy));
-    }
-    // The edge meets z = 0 in the direction descending * (w.y, -w.x): the part above
-    // spans the angle to it, the part below the azimuth.
+    bool below = max(p.z, q.z) <= 0.0 || dot(w.xy, w.xy) < 1e-6 * w2;
+    // The edge meets z = 0 in the direction w x z, descending, or its opposite: the part
+    // above spans the angle to it, the part below the azimuth.
     bool descending = p.z > 0.0;
     vec3 high = descending ? p : q;
     vec3 low = descending ? q : p;
     vec2 crossing = descending ? vec2(w.y, -w.x) : vec2(-w.y, w.x);
-    return unit_z * positive_atan2(high.z * length_w, dot(high.xy, crossing)) +
-           sign_z * positive_atan2(abs(low.z * w.z), dot(low.xy, crossing));
+    float y = below ? abs(w.z) : abs(low.z * w.z);
+    float x = below ? dot(p.xy, q.xy) : dot(low.xy, crossing);
+    float angle = sign_z * positive_atan2(y, x);
+    if (!below) {
+        angle += unit_z * positive_atan2(high.z * length_w, dot(high.xy, crossing));
+    }
+    return angle;
 }
 
 // 1/W(r) - pin, r = center + d, in difference form.

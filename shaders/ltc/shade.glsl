@@ -24,40 +24,55 @@ float light_form_factor(
         ? dot(normal, view.offset)
         : view.depth * dot(normal, cross(light.u, light.v));
     ContourSum sum = ContourSum(0.0, 0.0, 0.0);
-    vec2 pending = vec2(0.0);
+    vec2 pending = vec2(0.0);   // crossing that waits for its partner
     bool has_pending = false;
-    for (int i = 0; i < light.edge_count; ++i) {
-        vec4 edge = light_texel(light.first_edge + i);
-        vec2 a = (edge.xy - transformed.anchor) - transformed.anchor_low;
-        vec2 b = (edge.zw - transformed.anchor) - transformed.anchor_low;
-        // `precise`: an edge's end and the next one's start must agree to the bit.
-        precise float za = base + a.x * slope.x + a.y * slope.y;
-        precise float zb = base + b.x * slope.x + b.y * slope.y;
-        bool a_above = za > 0.0;
-        bool b_above = zb > 0.0;
-        if (!a_above && !b_above) {
-            continue;
+    vec2 closing_from = vec2(0.0);
+    vec2 closing_to = vec2(0.0);
+    bool closing = false;
+    int next = 0;
+    // One loop for the outline's edges and those that close it along the horizon, so
+    // that the integral is compiled once.
+    while (closing || next < light.edge_count) {
+        vec2 a = closing_from;
+        vec2 b = closing_to;
+        vec2 d = b - a;
+        float share = 1.0;
+        float moment;
+        if (closing) {
+            closing = false;
+            moment = cross_2d(a, d);
+        } else {
+            vec4 edge = light_texel(light.first_edge + next);
+            ++next;
+            a = (edge.xy - transformed.anchor) - transformed.anchor_low;
+            b = (edge.zw - transformed.anchor) - transformed.anchor_low;
+            // `precise`: an edge's end and the next one's start must agree to the bit.
+            precise float za = base + a.x * slope.x + a.y * slope.y;
+            precise float zb = base + b.x * slope.x + b.y * slope.y;
+            bool a_above = za > 0.0;
+            bool b_above = zb > 0.0;
+            if (!a_above && !b_above) {
+                continue;
+            }
+            d = edge.zw - edge.xy;
+            moment = cross_2d(a, d);
+            if (a_above != b_above) {
+                // Where edge line and horizon line meet; going there from a or b would
+                // lose a crossing near the anchor between far ends.
+                vec2 crossing =
+                    vec2(moment * slope.y - base * d.x, -moment * slope.x - base * d.y) /
+                    dot(slope, d);
+                closing_from = a_above ? crossing : pending;
+                closing_to = a_above ? pending : crossing;
+                closing = has_pending;
+                has_pending = !has_pending;
+                pending = crossing;
+                share = (a_above ? za : zb) / abs(za - zb);
+                a = a_above ? a : crossing;
+                b = a_above ? crossing : b;
+            }
         }
-        vec2 d = edge.zw - edge.xy;
-        float moment = cross_2d(a, d);
-        if (a_above && b_above) {
-            add_edge(transformed, a, b, d, moment, sum);
-            continue;
-        }
-        // Edge line and horizon line meet here; not on the way from a to b, which
-        // would lose a crossing near the anchor between far ends.
-        vec2 crossing = vec2(moment * slope.y - base * d.x, -moment * slope.x - base * d.y) /
-                        dot(slope, d);
-        float share = a_above ? za / (za - zb) : zb / (zb - za);
-        add_edge(transformed, a_above ? a : crossing, a_above ? crossing : b,
-                 share * d, share * moment, sum);
-        if (has_pending) {
-            vec2 from = a_above ? crossing : pending;
-            vec2 to = a_above ? pending : crossing;
-            add_edge(transformed, from, to, to - from, cross_2d(from, to), sum);
-        }
-        pending = crossing;
-        has_pending = !has_pending;
+        add_edge(transformed, a, b, share * d, share * moment, sum);
     }
     return form_factor(transformed, sum);
 }
