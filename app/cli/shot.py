@@ -1,0 +1,63 @@
+"""``ltc-viewer shot``: render a scene headless to a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.cli.common import (
+    DEFAULT_SIZE,
+    SceneArgument,
+    SizeOption,
+    Steps,
+    TechniqueOption,
+    headless_renderer,
+    image_size,
+    named_scene,
+)
+from app.errors import InputError
+from app.images import check_image_path, save_image
+from app.render.techniques import check_technique
+from app.scene import MAX_SAMPLES, RenderSettings, Shot
+
+
+def shot(
+    scene: SceneArgument,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="FILE", help="Picture to write: .png or .exr."),
+    ],
+    size: SizeOption = DEFAULT_SIZE,
+    samples: Annotated[
+        int,
+        typer.Option(
+            "--samples", metavar="N", help="Samples per pixel; 1 is exactly the pixel centre."
+        ),
+    ] = 16,
+    technique: TechniqueOption = "ltc",
+) -> None:
+    """Render a scene to a picture, without a window.
+
+    A .png holds the display colours, an .exr the linear radiance in float32.
+    The file appears only once it is complete; its name goes to stdout.
+
+    \b
+    Example:
+      ltc-viewer shot scene.json -o picture.png --size 1920x1080 --samples 64
+    """
+    width, height = image_size(size)
+    if not 1 <= samples <= MAX_SAMPLES:
+        raise InputError(f"--samples is {samples}, expected a number from 1 to {MAX_SAMPLES}")
+    check_technique(technique)
+    check_image_path(output)
+    settings = RenderSettings(technique=technique, samples=samples)
+    wanted = Shot(named_scene(scene), settings, width, height)
+    with headless_renderer() as (ctx, renderer):
+        with Steps("rendering", samples) as steps:
+            while (done := renderer.accumulate(wanted, samples)) < samples:
+                ctx.finish()
+                steps.done(done)
+        save_image(renderer, output)
+    typer.echo(output)
