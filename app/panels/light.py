@@ -123,6 +123,7 @@ def _placement(light: AreaLight, target: Vec3) -> tuple[AreaLight, SceneError | 
     normal = edits.normal_of(light.plane)
     azimuth = math.degrees(math.atan2(normal[0], normal[2]))
     elevation = math.degrees(math.asin(max(-1.0, min(1.0, normal[1]))))
+    azimuth, elevation = (round(angle, 9) + 0.0 for angle in (azimuth, elevation))
     turned = slider(
         "Azimuth", azimuth, -180.0, 180.0, "%.1f°", "Direction it faces, around the vertical"
     )

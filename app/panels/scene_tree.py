@@ -84,7 +84,6 @@ def _light_row(
 
 def _row(name: str, is_selected: bool, width: float = 0.0) -> bool:
     """Draw a line that can be selected and tell whether it was clicked."""
-    imgui.align_text_to_frame_padding()
     size = ImVec2(max(width, 0.0), imgui.get_frame_height())
     imgui.push_style_var(imgui.StyleVar_.selectable_text_align, ImVec2(0.0, 0.5))
     clicked, _ = imgui.selectable(name, is_selected, imgui.SelectableFlags_.none, size)
