@@ -15,29 +15,30 @@ Axes
     ``p^2 / (p^2 + r^2)`` instead .0027, .0051, .014.
 
 What the file holds
-    M = M0 (I + X) with M0 = `closed_form_guess` and X a small smooth residual,
-    bilinear between nodes: X00, X02 / s, X11, X20 / s with s the sine of the
-    view's angle (X02 and X20 change sign with the view). On the row of normal
-    incidence X00 = X11, where the lobe is round. Beside it the directional
-    albedo A and the Fresnel cosine u, from which B follows (below), bicubic
-    between nodes. Float32, 16 KB at most.
+    M = M0 (I + X) with M0 = `closed_form_guess` and X a small smooth residual:
+    X00, X02 / s, X11, X20 / s with s the sine of the view's angle (X02 and X20
+    change sign with the view). On the row of normal incidence X00 = X11,
+    where the lobe is round. Beside it the directional albedo A and the
+    Fresnel cosine u, from which B follows (below). All bicubic between nodes
+    (not-a-knot splines), float32, 9 KB.
 
 What the GPU samples
-    The residual as stored, and (A, u) resampled to 64^2, both bilinearly
-    (`IsotropicTable.textures`); ``B = A (1 - q u)^5`` with
-    ``q = sqrt(alpha^2 s^2 + c^2)``, the view's length after stretching by alpha.
-    M0 is computed per pixel: about 70 operations, once for all lights, for 36 KB
-    of textures instead of 128 KB. Baking M itself into a 64^2 texture cannot
-    work, because at low alpha the lobe follows the view while the y axis squeezes
-    most views into few rows; baked relative to the mirror direction it
-    does, at an error of .002 in M that computing avoids. Resampling
-    (A, u) costs .0003 in A and .0009 in B at most (32^2: .0011, .0032).
+    The residual resampled to 16^2 and (A, u) resampled to 64^2, both then
+    interpolated bilinearly (`IsotropicTable.textures`);
+    ``B = A (1 - q u)^5`` with ``q = sqrt(alpha^2 s^2 + c^2)``, the view's length
+    after stretching by alpha. M0 is computed per pixel: about 70 operations,
+    once for all lights. Baking M itself into a 64^2 texture cannot work,
+    because at low alpha the lobe follows the view while the y axis squeezes most
+    views into few rows; baked relative to the mirror direction it does, at
+    an error of .002 in M that computing avoids. Resampling (A, u) costs .0003
+    in A and .0009 in B at most (at 32^2: .0011, .0032); resampling X adds
+    1e-5 to the mean shading error of .0019.
 
 Shading
     A = integral of f cos(theta) with F = 1; B = the same with the weight
     (1 - wo.h)^5; so Schlick's albedo is ``f0 (A - B) + B``. The shading integral
-    over a light for F = 1 is ``A E / lobe_above_horizon(M)``, E the form factor
-    of M^-1 times the light clipped to the surface's z > 0.
+    over a light for F = 1 is `ltc.polygon.ltc_specular`: A E / (1 - leak), E the
+    form factor of M^-1 times the light clipped to the surface's z > 0.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
 from ltc.resources import resource_path
 
@@ -66,6 +67,9 @@ ALPHA_MIN = 1e-4
 
 FORMAT = "ltc-isotropic/1"
 """Value of ``format`` in the provenance of a file."""
+
+RESIDUAL_SIZE, ALBEDO_SIZE = 16, 64
+"""Texels on each axis of the textures that the GPU samples."""
 
 _ALPHA_LIMIT = 1e-6  # stands for alpha = 0 in the first column: entries differ by about as much
 _TILT = 0.7  # see closed_form_guess
@@ -230,11 +234,40 @@ def bilinear_weights(
     return index, weight
 
 
+def bicubic_weights(x: FloatArray, y: FloatArray, size: int) -> FloatArray:
+    """Return the weight of every node in the bicubic interpolation at (x, y).
+
+    Parameters
+    ----------
+    x, y : (...) float64
+        Table coordinates in [0, 1].
+    size : int, >= 4
+        Nodes on each axis.
+
+    Returns
+    -------
+    (..., size * size) float64
+        In the order ``row * size + column``; summing to 1.
+
+    Notes
+    -----
+    Products of cardinal not-a-knot cubic splines: the very interpolation of
+    the tables, as a linear map that a fit can use.
+    """
+    cardinal = make_interp_spline(np.linspace(0.0, 1.0, size), np.eye(size), k=3)
+    w = cardinal(y)[..., :, None] * cardinal(x)[..., None, :]
+    return np.asarray(w.reshape(*w.shape[:-2], size * size))
+
+
 def _smooth(values: NDArray[Any], x: FloatArray, y: FloatArray) -> FloatArray:
-    """Bicubic interpolation of values (n, n), n >= 4, at (x, y)."""
+    """Bicubic interpolation of values (n, n, ...), n >= 4, at (x, y)."""
     nodes = np.linspace(0.0, 1.0, values.shape[0])
-    spline = RectBivariateSpline(nodes, nodes, values.astype(np.float64))
-    return np.asarray(spline.ev(y, x))
+    channels = values.astype(np.float64).reshape(*values.shape[:2], -1)
+    result = [
+        RectBivariateSpline(nodes, nodes, channels[..., i]).ev(y, x)
+        for i in range(channels.shape[-1])
+    ]
+    return np.asarray(np.stack(result, axis=-1).reshape(*x.shape, *values.shape[2:]))
 
 
 def _interpolate(values: NDArray[Any], x: FloatArray, y: FloatArray) -> FloatArray:
@@ -255,30 +288,6 @@ def residual_matrix(entries: FloatArray, s: FloatArray) -> FloatArray:
     m[..., 2, 0] = s * entries[..., 3]
     m[..., 2, 2] = 1.0
     return m
-
-
-def lobe_above_horizon(M: ArrayLike) -> FloatArray:
-    """Return the share of a linearly transformed cosine that lies at z > 0.
-
-    Parameters
-    ----------
-    M : (..., 3, 3) float
-        ``shading_from_cosine``, determinant > 0.
-
-    Returns
-    -------
-    (...) float64
-        ``(1 + M22 / |M[2]|) / 2``, in [0, 1].
-
-    Notes
-    -----
-    z > 0 is the half space whose normal in cosine space is n = M^T e_z, the last
-    row of M. A clamped cosine about +z gives a half space through the
-    origin the share ``(1 + n_z / |n|) / 2`` (half its projected disc and half
-    an ellipse of relative width n_z / |n|).
-    """
-    row = np.asarray(M, dtype=np.float64)[..., 2, :]
-    return np.asarray(0.5 + 0.5 * row[..., 2] / np.linalg.norm(row, axis=-1))
 
 
 def stretched_length(alpha: ArrayLike, cos_theta: ArrayLike) -> FloatArray:
@@ -318,8 +327,8 @@ class IsotropicTable:
 
     def __post_init__(self) -> None:
         r, a, f = self.residual, self.albedo, self.fresnel
-        if r.ndim != 3 or r.shape[0] != r.shape[1] or r.shape[0] < 2 or r.shape[2] != 4:
-            raise ValueError(f"residual has shape {r.shape}, expected (n, n, 4) with n >= 2")
+        if r.ndim != 3 or r.shape[0] != r.shape[1] or r.shape[0] < 4 or r.shape[2] != 4:
+            raise ValueError(f"residual has shape {r.shape}, expected (n, n, 4) with n >= 4")
         if a.ndim != 2 or a.shape[0] != a.shape[1] or a.shape[0] < 4:
             raise ValueError(f"albedo has shape {a.shape}, expected (k, k) with k >= 4")
         if f.shape != a.shape:
@@ -336,17 +345,15 @@ class IsotropicTable:
             )
         if np.any(f < 0.0):
             raise ValueError(f"fresnel goes down to {f.min()}, expected values of 0 or more")
-        e = r.astype(np.float64)
-        _, c = node_grid(r.shape[0])
-        det = (1.0 + e[..., 2]) * (1.0 + e[..., 0] - (1.0 - c * c) * e[..., 1] * e[..., 3])
-        # 1 + X11 on its own: two wrong signs would make a right determinant.
-        wrong = (det <= 0.0) | (e[..., 2] <= -1.0)
-        if np.any(wrong):
-            row, column = (int(i) for i in np.argwhere(wrong)[0])
-            raise ValueError(
-                f"residual[{row}, {column}] has determinant {det[row, column]:.4g},"
-                " expected a positive one"
-            )
+        for texels, what in ((r, "residual"), (self.textures()[0], "residual between nodes")):
+            factors = _determinant_factors(texels)
+            wrong = np.any(factors <= 0.0, axis=-1)
+            if np.any(wrong):
+                row, column = (int(i) for i in np.argwhere(wrong)[0])
+                raise ValueError(
+                    f"{what} at [{row}, {column}] of {texels.shape[0]}^2 has determinant"
+                    " {:.4g} * {:.4g}, expected two positive factors".format(*factors[row, column])
+                )
 
     @property
     def payload(self) -> int:
@@ -370,7 +377,7 @@ class IsotropicTable:
         a, c = np.broadcast_arrays(a, c)
         s = np.sqrt(1.0 - c * c)
         v = np.stack([s, np.zeros_like(c), c], axis=-1)
-        M = closed_form_guess(a, a, v) @ residual_matrix(_interpolate(self.residual, x, y), s)
+        M = closed_form_guess(a, a, v) @ residual_matrix(_smooth(self.residual, x, y), s)
         return np.asarray(M / np.linalg.norm(M[..., :, 2], axis=-1)[..., None, None])
 
     def albedo_terms(self, alpha: ArrayLike, cos_theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -384,26 +391,40 @@ class IsotropicTable:
         A, u = _smooth(self.albedo, x, y), _smooth(self.fresnel, x, y)
         return A, A * (1.0 - np.minimum(stretched_length(a, c) * u, 1.0)) ** 5
 
-    def textures(self, albedo_size: int = 64) -> Textures:
-        """Return what the GPU samples bilinearly.
+    def textures(
+        self, residual_size: int = RESIDUAL_SIZE, albedo_size: int = ALBEDO_SIZE
+    ) -> Textures:
+        """Return what the GPU samples bilinearly, resampled from the bicubic tables.
 
         Parameters
         ----------
-        albedo_size : int, >= 2
-            Texels on each axis of the second texture, which is resampled from
-            the bicubic one of the file.
+        residual_size, albedo_size : int, >= 2
+            Texels on each axis of the two textures.
 
         Returns
         -------
-        residual : (n, n, 4) float32
-            As stored; row: view, column: alpha.
+        residual : (residual_size, residual_size, 4) float32
+            X00, X02 / s, X11, X20 / s; row: view, column: alpha.
         albedo : (albedo_size, albedo_size, 2) float32
             A and u.
         """
-        nodes = np.linspace(0.0, 1.0, albedo_size)
-        x, y = np.broadcast_arrays(nodes[None, :], nodes[:, None])
-        pair = np.stack([_smooth(self.albedo, x, y), _smooth(self.fresnel, x, y)], axis=-1)
-        return self.residual, pair.astype(np.float32)
+        residual = _resample(self.residual, residual_size)
+        pair = np.stack([self.albedo, self.fresnel], axis=-1)
+        return residual, _resample(pair, albedo_size)
+
+
+def _resample(values: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """Return bicubic values (n, n, ...) at the nodes of a table of another size."""
+    nodes = np.linspace(0.0, 1.0, size)
+    x, y = np.broadcast_arrays(nodes[None, :], nodes[:, None])
+    return _smooth(values, x, y).astype(np.float32)
+
+
+def _determinant_factors(residual: NDArray[np.float32]) -> FloatArray:
+    """Return the determinants in xz and along y of I + X at the nodes, (n, n, 2)."""
+    _, c = node_grid(residual.shape[0])
+    X00, X02, X11, X20 = np.moveaxis(residual.astype(np.float64), -1, 0)
+    return np.stack([1.0 + X00 - (1.0 - c * c) * X02 * X20, 1.0 + X11], axis=-1)
 
 
 def sample_textures(
