@@ -7,6 +7,7 @@ that has something glossy. The probe runs the very same functions on given point
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 
 import moderngl
 import numpy as np
@@ -16,7 +17,7 @@ from app.render.camera import CameraFrame
 from app.render.features import LightingFeatures, LightNeeds, probe_defines
 from app.render.pack import pack_lights, pack_materials
 from app.render.programs import Programs, ProgramSpec, set_uniform
-from app.render.state import FullScreenTriangle, begin_pass
+from app.render.state import FullScreenTriangle, begin_pass, release_framebuffer
 from app.render.storage import TexelStorage
 from app.render.tables import isotropic_textures
 from app.scene import AreaLight, Material
@@ -158,9 +159,7 @@ class LightingPass:
         count = len(inputs[0])
         width = min(count, PROBE_SIDE)
         height = -(-count // width)
-        owned: list[moderngl.Texture | moderngl.Framebuffer] = []
-        points: list[moderngl.Texture] = []
-        try:
+        with ExitStack() as stack:
             for unit, (name, values) in enumerate(
                 zip(("positions", "normals", "views", "alphas"), inputs, strict=True), start=6
             ):
@@ -169,17 +168,16 @@ class LightingPass:
                 texture = self._ctx.texture(
                     (width, height), values.shape[1], filled.tobytes(), alignment=4, dtype="f4"
                 )
-                owned.append(texture)
-                points.append(texture)
+                stack.callback(texture.release)
                 texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+                texture.use(unit)
                 set_uniform(program, name, unit)
             outputs = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(2)]
-            owned += outputs
+            for output in outputs:
+                stack.callback(output.release)
             target = self._ctx.framebuffer(color_attachments=outputs)
-            owned.append(target)
+            stack.callback(release_framebuffer, target)
             begin_pass(target, (width, height))
-            for unit, texture in enumerate(points, start=6):
-                texture.use(unit)
             self._bind_shading(program)
             self._triangle.draw(program)
             specular, diffuse = (
@@ -187,9 +185,6 @@ class LightingPass:
                 for output in outputs
             )
             return specular, diffuse
-        finally:
-            for thing in reversed(owned):
-                thing.release()
 
     def _bind_shading(self, program: moderngl.Program) -> None:
         set_uniform(program, "light_count", self._light_count)

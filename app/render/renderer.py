@@ -25,7 +25,7 @@ from app.render.plan import Needs, Plan, make_plan, needs_of
 from app.render.post import DisplayPass
 from app.render.programs import Programs
 from app.render.sampling import pixel_offset
-from app.render.state import begin_pass
+from app.render.state import begin_pass, release_framebuffer
 from app.render.techniques import check_technique
 from app.render.timers import PassTimers
 from app.scene import Display, RenderSettings, Scene, Shot
@@ -113,7 +113,7 @@ class _Targets:
     def keep_only(self, names: set[str]) -> None:
         for name in [n for n in self._textures if n not in names]:
             if name in self._framebuffers:
-                self._framebuffers.pop(name).release()
+                release_framebuffer(self._framebuffers.pop(name))
             self._textures.pop(name).release()
         if "gbuffer" not in names and self._depth is not None:
             self._depth.release()
@@ -131,7 +131,7 @@ class _Targets:
 
     def release(self) -> None:
         for framebuffer in self._framebuffers.values():
-            framebuffer.release()
+            release_framebuffer(framebuffer)
         for texture in self._textures.values():
             texture.release()
         if self._depth is not None:
@@ -174,6 +174,7 @@ class Renderer:
         self._held_materials: tuple[object, object, int] | None = None
         self._needs: Needs | None = None
         self._seen: _Seen | None = None
+        self._stale = False
         self._samples = 0
         self._newest = ""
         self._displayed: Display | None = None
@@ -200,6 +201,7 @@ class Renderer:
         limit = max(1, max_samples)
         restart = (
             self._seen is None
+            or self._stale
             or not self._seen.same_radiance(shot)
             or (limit > 1 and self._needs is not None and not self._needs.accumulates)
         )
@@ -425,7 +427,7 @@ class Renderer:
         try:
             changed = self.programs.reload()
         finally:
-            self._seen = self._seen and None
+            self._stale = True
             self._displayed = None
         return changed
 
@@ -438,15 +440,20 @@ class Renderer:
         self._timers.release()
         self.programs.release()
         if self._pick_target is not None:
-            self._pick_target.color_attachments[0].release()
-            self._pick_target.depth_attachment.release()
-            self._pick_target.release()
+            color, depth = self._pick_target.color_attachments, self._pick_target.depth_attachment
+            release_framebuffer(self._pick_target)
+            for attachment in (*color, depth):
+                if attachment is not None:
+                    attachment.release()
             self._pick_target = None
 
     # Within
 
     def _begin(self, shot: Shot, samples: int) -> None:
-        """Hold what ``shot`` needs and forget earlier samples."""
+        """Hold what ``shot`` needs and forget earlier samples.
+
+        If that fails, the last picture stays, and the next call starts again.
+        """
         start = time.perf_counter()
         check_technique(shot.settings.technique)
         side = max(shot.width, shot.height)
@@ -458,7 +465,9 @@ class Renderer:
         scene = shot.scene
         needs = needs_of(scene, samples, self.limits)
         features = needs.lighting
-        self._seen = None
+        self._stale = True
+        for spec in needs.programs:
+            self.programs.get(spec)
         if features.lit:
             self._hold_geometry(scene)
             self._hold_lights(scene, features.lights)
@@ -480,6 +489,7 @@ class Renderer:
         self._targets.keep_only({name for name, _ in needs.attachments} - {"depth"})
         self._needs = needs
         self._seen = _Seen(shot)
+        self._stale = False
         self._samples = 0
         self._newest = ""
         self._displayed = None

@@ -56,6 +56,18 @@ def begin_pass(
     return ctx
 
 
+def release_framebuffer(framebuffer: moderngl.Framebuffer) -> None:
+    """Release a framebuffer that may be bound.
+
+    moderngl binds the last used one again after making another, which is a GL
+    error if it is gone; so the default framebuffer becomes the last used.
+    """
+    ctx: moderngl.Context = framebuffer.ctx
+    # Contexts without a window have no `screen`.
+    (ctx.screen or ctx.detect_framebuffer(0)).use()
+    framebuffer.release()
+
+
 class FullScreenTriangle:
     """Runs a fragment shader over a whole target: three vertices and no buffer."""
 

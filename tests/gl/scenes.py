@@ -40,9 +40,7 @@ def ball(material: Material = GLOSSY) -> SceneObject:
 
 def one_light(material: Material = GLOSSY, light: AreaLight = KEY) -> Scene:
     """A floor, a ball, and a square light behind them that faces the camera."""
-    return Scene(
-        materials=(material,), objects=(floor(material), ball(material)), lights=(light,)
-    )
+    return Scene(materials=(material,), objects=(floor(material), ball(material)), lights=(light,))
 
 
 def many_lights(count: int, *, two_sided: bool = False) -> Scene:
