@@ -15,7 +15,13 @@ from dataclasses import dataclass
 import moderngl
 
 from app.errors import InputError
-from app.render.pack import MAX_INDEX, TEXELS_PER_LIGHT, TEXELS_PER_MATERIAL, light_geometry
+from app.render.pack import (
+    MAX_INDEX,
+    TEXELS_PER_EDGE,
+    TEXELS_PER_LIGHT,
+    TEXELS_PER_MATERIAL,
+    light_geometry,
+)
 from app.scene import AreaLight, Material, Scene
 
 STORAGE_TEXTURE_WIDTH = 1024
@@ -68,7 +74,7 @@ class LightNeeds:
         """Raise `InputError` if the lights have more edges than the machine can hold."""
         shining = [light for light in lights if any(light.radiance)]
         edges = sum(len(light_geometry(light).edges) for light in shining)
-        texels = TEXELS_PER_LIGHT * len(lights) + edges
+        texels = TEXELS_PER_LIGHT * len(lights) + TEXELS_PER_EDGE * edges
         if texels > limits.storage_texels:
             raise InputError(
                 f"lights: {len(lights)} lights with {edges} edges need {texels} records, "

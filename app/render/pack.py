@@ -30,11 +30,20 @@ LIGHT_HEADER = np.dtype(
         ("edge_count", "<f4"),
         ("v", "<f4", 3),
         ("radius", "<f4"),
-        ("radiance", "<f4", 3),
+        ("n", "<f4", 3),
         ("two_sided", "<f4"),
+        ("origin_low", "<f4", 3),
+        ("red", "<f4"),
+        ("u_low", "<f4", 3),
+        ("green", "<f4"),
+        ("v_low", "<f4", 3),
+        ("blue", "<f4"),
+        ("n_low", "<f4", 3),
+        ("unused", "<f4"),
     ]
 )
-"""Four texels. Indices and counts are floats, exact up to 2^24."""
+"""Eight texels. Indices and counts are floats, exact up to 2^24; ``low`` is what
+rounding to float32 took."""
 
 MATERIAL_RECORD = np.dtype(
     [
@@ -53,6 +62,7 @@ LIGHT_VERTEX = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("id", "<
 
 TEXELS_PER_LIGHT = LIGHT_HEADER.itemsize // 16
 TEXELS_PER_MATERIAL = MATERIAL_RECORD.itemsize // 16
+TEXELS_PER_EDGE = 2
 MAX_INDEX = 2**24
 """Texel indices are stored as float32."""
 
@@ -128,23 +138,34 @@ def pack_lights(lights: Sequence[AreaLight]) -> NDArray[np.float32]:
     A light without radiance keeps its header and gets no edges: nothing to integrate.
     """
     header = np.zeros(len(lights), dtype=LIGHT_HEADER)
-    edges: list[FloatArray] = []
+    edges: list[NDArray[np.float32]] = []
     first = TEXELS_PER_LIGHT * len(lights)
     for record, light in zip(header, lights, strict=True):
         geometry = light_geometry(light)
         mine = geometry.edges if any(light.radiance) else geometry.edges[:0]
-        record["origin"] = geometry.origin
+        for name, vector in (
+            ("origin", geometry.origin),
+            ("u", geometry.u),
+            ("v", geometry.v),
+            ("n", np.cross(geometry.u, geometry.v)),
+        ):
+            record[name], record[f"{name}_low"] = _split(vector)
         record["first_edge"] = first
-        record["u"] = geometry.u
         record["edge_count"] = len(mine)
-        record["v"] = geometry.v
-        record["radius"] = geometry.radius
-        record["radiance"] = light.radiance
+        # Rounded up: the shader skips what this circle says is below the surface.
+        record["radius"] = np.float32(geometry.radius) * np.float32(1.0 + 1e-6)
         record["two_sided"] = light.two_sided
-        edges.append(mine)
-        first += len(mine)
+        record["red"], record["green"], record["blue"] = light.radiance
+        edges.append(np.stack(_split(mine), axis=1).reshape(-1, 4))
+        first += TEXELS_PER_EDGE * len(mine)
     texels = header.view(np.float32).reshape(-1, 4)
-    return np.concatenate([texels, *(e.astype(np.float32) for e in edges)])
+    return np.concatenate([texels, *edges])
+
+
+def _split(values: FloatArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return ``values`` as an unevaluated sum of two float32 arrays."""
+    high = values.astype(np.float32)
+    return high, (values - high).astype(np.float32)
 
 
 def pack_materials(materials: Sequence[Material]) -> NDArray[np.float32]:
