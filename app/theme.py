@@ -79,6 +79,7 @@ _COLOURS = {
     "scrollbar_grab_hovered": grey(0.34),
     "scrollbar_grab_active": grey(0.4),
     "check_mark": ACCENT,
+    "checkbox_selected_bg": grey(0.185),
     "slider_grab": grey(0.55),
     "slider_grab_active": ACCENT,
     "button": grey(0.215),

@@ -143,6 +143,7 @@ class Viewport:
         self._full_size_seconds = 0.0
         self._hidden: frozenset[tuple[int, int]] = frozenset()
         self._unasked: list[tuple[tuple[int, int], Vec2]] = []
+        self._is_asking = False
         self._occlusion_of: tuple[Shot | None, int] | None = None
         self._hovered_light: int | None = None
         self._changed_at = 0.0
@@ -169,7 +170,7 @@ class Viewport:
     @property
     def is_idle(self) -> bool:
         """Whether nothing is left to do until the user does something."""
-        return self.is_settled and not self._unasked
+        return self.is_settled and not self._is_asking
 
     @property
     def shot(self) -> Shot | None:
@@ -196,12 +197,13 @@ class Viewport:
         self._canvas(editor)
         self._render(editor.scene, settings)
         self._picture()
+        self._is_asking = False
         if self.show_overlays:
             self._overlays(editor)
             self._manipulate(editor)
             self._help_line()
 
-    def _camera(self, scene: Scene) -> Camera:
+    def camera_of(self, scene: Scene) -> Camera:
         """Return the camera that the picture is seen with."""
         return widened(scene.camera, self.view.width / self.view.height)
 
@@ -255,7 +257,7 @@ class Viewport:
         right = imgui.is_mouse_down(imgui.MouseButton_.right)
         middle = imgui.is_mouse_down(imgui.MouseButton_.middle)
         if right or io.key_shift:
-            panned = control.pan(self._camera(editor.scene), dx, dy, self.view.height)
+            panned = control.pan(self.camera_of(editor.scene), dx, dy, self.view.height)
             editor.look(replace(panned, fov_y=camera.fov_y))
         elif middle and io.key_ctrl:
             editor.look(control.dolly(camera, -0.05 * dy))
@@ -299,7 +301,7 @@ class Viewport:
         if light is None:
             self._corner = None
             return
-        index, camera = editor.selection.index, self._camera(editor.scene)
+        index, camera = editor.selection.index, self.camera_of(editor.scene)
         vertices = edits.vertices_of(light)
         if len(vertices) > MOST_HANDLES:
             return
@@ -355,7 +357,7 @@ class Viewport:
         light = editor.scene.lights[drag.light]
         if not (io.mouse_delta.x or io.mouse_delta.y):
             return
-        camera, plane = self._camera(editor.scene), light.plane
+        camera, plane = self.camera_of(editor.scene), light.plane
         direction = self.view.ray(
             camera, io.mouse_pos.x + drag.grip[0], io.mouse_pos.y + drag.grip[1]
         )
@@ -388,7 +390,7 @@ class Viewport:
         if selection.kind == "none" or self._corner is not None:
             self._gizmo, self._gizmo_hovered = None, False
             return
-        view, camera = self.view, self._camera(scene)
+        view, camera = self.view, self.camera_of(scene)
         gizmo.set_drawlist()
         gizmo.set_rect(view.x, view.y, view.width, view.height)
         start = _pose(scene, selection) if self._gizmo is None else None
@@ -428,7 +430,7 @@ class Viewport:
         if moving and self._full_size_seconds > SLOW:
             divisor = min(math.ceil(math.sqrt(self._full_size_seconds / SLOW)), SMALLEST)
         width, height = math.ceil(width / divisor), math.ceil(height / divisor)
-        camera = self._camera(scene)
+        camera = self.camera_of(scene)
         if self._shown is None or self._shown[0] is not scene or self._shown[1] != camera:
             self._shown = (scene, camera, replace(scene, camera=camera))
         shot = Shot(self._shown[2], replace(settings, samples=1), width, height)
@@ -471,7 +473,7 @@ class Viewport:
 
     def _overlays(self, editor: Editor) -> None:
         scene, chosen = editor.scene, editor.selection
-        camera = self._camera(scene)
+        camera = self.camera_of(scene)
         draw, view = imgui.get_window_draw_list(), self.view
         high = ImVec2(view.x + view.width, view.y + view.height)
         draw.push_clip_rect(ImVec2(view.x, view.y), high, True)
@@ -527,7 +529,7 @@ class Viewport:
             draw.add_circle_filled(ends[1], 3.0, theme.u32(theme.ACCENT, 0.8))
 
     def _corners(self, draw: imgui.ImDrawList, editor: Editor, light: AreaLight) -> None:
-        camera, mouse = self._camera(editor.scene), imgui.get_io().mouse_pos
+        camera, mouse = self.camera_of(editor.scene), imgui.get_io().mouse_pos
         if self.is_settled:
             self._find_hidden(editor.scene, editor.selection.index)
         for _, _, at, long_enough in _edge_middles(self.view, camera, light):
@@ -557,7 +559,7 @@ class Viewport:
 
     def _find_hidden(self, scene: Scene, index: int) -> None:
         """Find out, a few at a time once nothing moves, which corners are behind something."""
-        light, camera = scene.lights[index], self._camera(scene)
+        light, camera = scene.lights[index], self.camera_of(scene)
         if self._occlusion_of != (self._shot, index):
             self._occlusion_of = (self._shot, index)
             self._unasked = edits.vertices_of(light)[:MOST_ASKED]
@@ -573,7 +575,8 @@ class Viewport:
                 and (hit.kind, hit.index) != ("light", index)
                 and length(subtract(hit.position_ws, camera.eye)) < 0.999 * away
             )
-            self._hidden = self._hidden - {vertex} if not behind else self._hidden | {vertex}
+            self._hidden = self._hidden | {vertex} if behind else self._hidden - {vertex}
+        self._is_asking = bool(self._unasked)
 
     def _help_line(self) -> None:
         """Write the help over the lower edge of the picture."""

@@ -9,6 +9,11 @@ one step of the history, whichever panel it came from.
 
 from __future__ import annotations
 
+# isort: off
+import imgui_bundle  # noqa: F401  (first: glfw then takes the library that imgui-bundle carries)
+import glfw
+# isort: on
+
 import contextlib
 import sys
 import time
@@ -18,7 +23,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import glfw
 import moderngl
 from imgui_bundle import ImVec2, hello_imgui, imgui, immapp
 from imgui_bundle import icons_fontawesome_4 as icons
@@ -500,8 +504,8 @@ class Window:
         """Select the first light in the middle of the picture, so that its corners show."""
         scene = self.editor.scene
         for index, light in enumerate(scene.lights):
-            at = project(scene.camera, edits.centre_of(light), 1.2, 1.0)
-            if at is not None and 0.1 < at[0] < 1.1 and 0.1 < at[1] < 0.9:
+            at = project(scene.camera, edits.centre_of(light), 1.5, 1.0)
+            if at is not None and 0.1 < at[0] < 1.4 and 0.1 < at[1] < 0.9:
                 self.editor.selection = Selection.light(index)
                 return
 
@@ -735,7 +739,7 @@ def _layout(windows: dict[str, Callable[[], None]]) -> hello_imgui.DockingParams
         hello_imgui.DockingSplit(centre, "Left", imgui.Dir.left, 0.18),
         hello_imgui.DockingSplit(centre, "Right", imgui.Dir.right, 0.26),
         hello_imgui.DockingSplit("Left", "LeftLow", imgui.Dir.down, 0.52),
-        hello_imgui.DockingSplit("Right", "RightLow", imgui.Dir.down, 0.44),
+        hello_imgui.DockingSplit("Right", "RightLow", imgui.Dir.down, 0.41),
     ]
     spaces = {
         "Viewport": centre,

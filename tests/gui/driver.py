@@ -1,0 +1,459 @@
+"""Runs the scenarios in one application and writes what became of each as JSON.
+
+Usage: python -m tests.gui.driver FOLDER
+"""
+
+from __future__ import annotations
+
+# isort: off
+import imgui_bundle  # noqa: F401  (first: glfw then takes the library that imgui-bundle carries)
+import glfw
+# isort: on
+
+import json
+import pickle
+import sys
+import time
+import traceback
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from imgui_bundle import imgui
+
+from app import edits
+from app.editor import NOTHING, Selection
+from app.panels.export import Export
+from app.scene import (
+    AreaLight,
+    Camera,
+    Display,
+    Material,
+    Outline,
+    Plane,
+    PolygonContour,
+    Scene,
+    SceneObject,
+    Transform,
+)
+from app.scene_io import load_scene
+from tests.gui.application import Application
+
+CTRL, SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
+SAMPLES = 4
+
+SCENE = Scene(
+    materials=(
+        Material("floor", (0.2, 0.2, 0.2), (0.04, 0.04, 0.04), (0.09, 0.09)),
+        Material("red", (0.6, 0.1, 0.1), (0.04, 0.04, 0.04), (0.25, 0.25)),
+    ),
+    objects=(
+        SceneObject("floor", "plane", "floor", Transform(scale=(6.0, 6.0, 6.0))),
+        SceneObject("ball", "sphere", "red", Transform((1.3, 0.5, 0.3), scale=(0.5, 0.5, 0.5))),
+    ),
+    lights=(
+        AreaLight(
+            "key",
+            Outline((PolygonContour(((-0.8, -0.6), (0.8, -0.6), (0.8, 0.6), (-0.8, 0.6))),)),
+            Plane((-0.4, 1.1, -1.0)),
+            (4.0, 3.6, 3.0),
+        ),
+    ),
+    camera=Camera((0.0, 1.3, 4.5), (0.0, 0.8, 0.0)),
+    display=Display(0.0, "agx"),
+)
+
+
+def start(app: Application) -> None:
+    """Bring the application back to the first scene, its light selected."""
+    app.window.show(SCENE, None)
+    app.window.settings = replace(app.window.settings, samples=SAMPLES)
+    app.window.viewport.tool = "move"
+    app.window.editor.selection = Selection.light(0)
+    app.act(lambda ctx: ctx.mouse_move_to_pos(imgui.ImVec2(5.0, 695.0)))
+    app.settle()
+
+
+def drag_a_corner(app: Application, out: Path) -> None:
+    before, x, y = app.picture(), *app.corner((0, 2))
+    app.drag("vertex 0.2", 60.0, -40.0)
+    points = app.scene.lights[0].outline.contours[0].points
+    old = SCENE.lights[0].outline.contours[0].points
+    assert [a == b for a, b in zip(points, old, strict=True)] == [True, True, False, True]
+    assert np.allclose(app.corner((0, 2)), (x + 60.0, y - 40.0), atol=1.0)
+    assert app.window.editor.steps == ("Open", "Move corner of 'key'")
+    assert app.window.editor.selection == Selection.light(0, (0, 2))
+    assert "•" in app.window.title
+    after = app.picture()
+    assert (np.abs(after.astype(int) - before).max(-1) > 8).mean() > 0.02
+    lit = after[
+        round(y - 30.0 - app.window.viewport.view.y), round(x + 40 - app.window.viewport.view.x)
+    ]
+    assert lit.min() > 120, "the light itself follows the corner"
+
+    app.key(CTRL | imgui.Key.z)
+    assert app.scene == SCENE
+    assert np.array_equal(app.picture(), before), "undo brings the very same pixels back"
+    assert "•" not in app.window.title
+    app.key(CTRL | imgui.Key.y)
+    assert app.scene.lights[0].outline.contours[0].points == points
+    assert np.array_equal(app.picture(), after)
+    app.key(CTRL | SHIFT | imgui.Key.z)
+    assert app.window.editor.redo_name is None
+
+
+def press_a_corner_without_moving_it(app: Application, out: Path) -> None:
+    app.click("vertex 0.1")
+    assert app.window.editor.selection == Selection.light(0, (0, 1))
+    assert app.scene == SCENE
+    assert app.window.editor.undo_name is None
+
+
+def escape_cancels_a_drag(app: Application, out: Path) -> None:
+    def action(ctx) -> None:
+        ctx.mouse_move("//**/vertex 0.0")
+        ctx.mouse_down(0)
+        ctx.mouse_move_to_pos(imgui.ImVec2(ctx.inputs.mouse_pos_value.x + 50.0, 300.0))
+        ctx.key_press(imgui.Key.escape)
+        ctx.mouse_move_to_pos(imgui.ImVec2(300.0, 320.0))
+        ctx.mouse_up(0)
+
+    app.act(action)
+    assert app.scene == SCENE
+    assert app.window.editor.undo_name is None
+
+
+def change_roughness_by_its_slider(app: Application, out: Path) -> None:
+    app.window.editor.selection = Selection.object(1)
+    app.settle()
+    before = app.picture()
+    app.enter("##roughness", 0.2)
+    assert np.allclose(app.scene.materials[1].alpha, 0.04)
+    assert app.window.editor.steps == ("Open", "Change roughness of 'red'")
+    after = app.picture()
+    assert not np.array_equal(after, before)
+    programs = app.window.renderer.programs
+    compiled = getattr(programs, "compiled", None)
+    app.drag("##roughness", 40.0, 0.0)
+    assert len(app.window.editor.steps) == 3, "one drag of a slider is one step"
+    assert getattr(programs, "compiled", None) == compiled, "a value compiles nothing"
+    app.key(CTRL | imgui.Key.z)
+    app.key(CTRL | imgui.Key.z)
+    assert app.scene.materials == SCENE.materials
+    assert np.array_equal(app.picture(), before)
+
+
+def add_and_remove_a_corner(app: Application, out: Path) -> None:
+    app.drag("edge 0.0", 0.0, 40.0)
+    points = app.scene.lights[0].outline.contours[0].points
+    assert len(points) == 5
+    assert points[1][1] < -0.6
+    assert app.window.editor.steps == ("Open", "Add corner to 'key'")
+    assert app.window.editor.selection.vertex == (0, 1)
+    app.key(imgui.Key.delete)
+    assert app.scene.lights == SCENE.lights
+    app.window.editor.selection = Selection.light(0, (0, 0))
+    app.key(imgui.Key.delete)
+    assert len(app.scene.lights[0].outline.contours[0].points) == 3
+    app.window.editor.selection = Selection.light(0, (0, 0))
+    app.key(imgui.Key.delete)
+    assert len(app.scene.lights[0].outline.contours[0].points) == 3
+    assert any("3 is the fewest" in message.text for message in app.window.messages.shown)
+
+
+def cut_a_hole(app: Application, out: Path) -> None:
+    x, y = app.on_screen(edits.centre_of(SCENE.lights[0]))
+    view = app.window.viewport.view
+    at = round(y - view.y), round(x - view.x)
+    assert app.picture()[at].min() > 120
+    app.click("Add hole")
+    assert len(app.scene.lights[0].outline.contours) == 2
+    assert app.picture()[at].max() < 60, "one looks through the hole"
+    app.drag("vertex 1.0", -20.0, -10.0)
+    app.click("Remove hole")
+    assert app.scene.lights == SCENE.lights
+    assert len(app.window.editor.steps) == 4
+
+
+def add_copy_and_remove_lights(app: Application, out: Path) -> None:
+    before = app.picture()
+    app.click("###add light")
+    assert [light.name for light in app.scene.lights] == ["key", "light"]
+    assert app.window.editor.selection == Selection.light(1)
+    after = app.picture()
+    assert (np.abs(after.astype(int) - before).max(-1) > 8).mean() > 0.02
+    app.key(CTRL | imgui.Key.d)
+    assert [light.name for light in app.scene.lights] == ["key", "light", "light 2"]
+    app.key(imgui.Key.delete)
+    app.window.editor.selection = Selection.light(1)
+    app.key(imgui.Key.delete)
+    assert app.scene.lights == SCENE.lights
+    assert np.array_equal(app.picture(), before)
+
+
+def select_by_clicking(app: Application, out: Path) -> None:
+    x, y = app.on_screen((1.3, 0.5, 0.8))
+    app.click_at(x, y)
+    assert app.window.editor.selection == Selection.object(1)
+    x, y = app.on_screen(edits.point_on(SCENE.lights[0].plane, (-0.5, 0.4)))
+    app.click_at(x, y)
+    assert app.window.editor.selection == Selection.light(0)
+    view = app.window.viewport.view
+    app.click_at(view.x + view.width - 8.0, view.y + 60.0)
+    assert app.window.editor.selection == NOTHING
+    assert app.window.editor.undo_name is None
+
+
+def look_around(app: Application, out: Path) -> None:
+    view = app.window.viewport.view
+    x, y = view.x + 30.0, view.y + 120.0
+    for button in (0, 2):
+        camera = app.scene.camera
+        app.drag_at(x, y, 80.0, 30.0, button)
+        turned = app.scene.camera
+        assert turned.target == camera.target
+        assert turned.eye != camera.eye
+        assert turned.eye[1] > camera.eye[1], "dragging down looks from higher up"
+    camera = app.scene.camera
+    target = app.on_screen(camera.target)
+    app.drag_at(x, y, 50.0, 20.0, 1)
+    assert app.scene.camera.target != camera.target
+    assert app.scene.camera.fov_y == camera.fov_y
+    moved = app.on_screen(camera.target)
+    assert np.allclose(moved, (target[0] + 50.0, target[1] + 20.0), atol=8.0)
+    distance = np.linalg.norm(np.subtract(app.scene.camera.eye, app.scene.camera.target))
+
+    def wheel(ctx) -> None:
+        ctx.mouse_move_to_pos(imgui.ImVec2(x, y))
+        ctx.yield_(2)
+        ctx.mouse_wheel_y(2.0)
+
+    app.act(wheel)
+    nearer = np.linalg.norm(np.subtract(app.scene.camera.eye, app.scene.camera.target))
+    assert np.isclose(nearer, distance * 0.81)
+    app.window.editor.selection = Selection.object(1)
+    app.key(imgui.Key.f)
+    assert np.allclose(app.scene.camera.target, (1.3, 0.5, 0.3), atol=1e-3)
+    assert app.window.editor.undo_name is None
+    assert not app.window.editor.is_modified
+
+
+def move_and_turn_with_the_gizmo(app: Application, out: Path) -> None:
+    centre = edits.centre_of(SCENE.lights[0])
+    x, y = app.on_screen(centre)
+    app.drag_at(x, y, 70.0, 0.0)
+    light = app.scene.lights[0]
+    assert light.outline is SCENE.lights[0].outline
+    assert light.plane.origin[0] > SCENE.lights[0].plane.origin[0] + 0.2
+    assert app.window.editor.steps == ("Open", "Move 'key'")
+    app.key(CTRL | imgui.Key.z)
+    assert app.scene == SCENE
+    app.key(imgui.Key.e)
+    assert app.window.viewport.tool == "rotate"
+    app.settle()
+    for radius in np.arange(40.0, 140.0, 4.0):
+        app.drag_at(x + radius, y, 0.0, 50.0)
+        if app.window.editor.undo_name is not None:
+            break
+        app.window.editor.look(SCENE.camera)
+    assert app.window.editor.steps == ("Open", "Rotate 'key'")
+    turned = app.scene.lights[0]
+    assert np.allclose(edits.centre_of(turned), centre, atol=1e-5)
+    assert np.isclose(np.linalg.norm(turned.plane.u), 1.0)
+
+
+def save_reload_compare(app: Application, out: Path) -> None:
+    path = out / "saved.json"
+    app.drag("vertex 0.2", 30.0, -20.0)
+    app.enter("##radiance", 2.5)
+    app.window.save_as(path)
+    assert not app.window.editor.is_modified
+    app.frame()
+    assert app.window.title.startswith("saved.json —")
+    saved, picture = app.scene, app.picture()
+    app.drag("vertex 0.0", -30.0, 20.0)
+    app.key(CTRL | imgui.Key.s)
+    assert load_scene(path) == app.scene
+    app.key(CTRL | imgui.Key.z)
+    app.key(CTRL | imgui.Key.s)
+    app.window.show(SCENE, None)
+    app.window.open(path)
+    assert app.scene == saved
+    assert app.window.editor.path == path
+    assert np.array_equal(app.picture(), picture)
+
+
+def same_picture_as_headless(app: Application, out: Path) -> None:
+    picture = app.picture()
+    shot = app.window.viewport.shot
+    assert shot is not None
+    shot = replace(shot, settings=replace(shot.settings, samples=SAMPLES))
+    (out / "shot.pickle").write_bytes(pickle.dumps(shot))
+    np.save(out / "picture.npy", picture)
+
+
+def idle_when_nothing_changes(app: Application, out: Path) -> None:
+    passes = app.window.renderer.lighting_passes
+    assert app.window.viewport.samples == (SAMPLES, SAMPLES)
+    for _ in range(30):
+        app.frame()
+    assert app.window.renderer.lighting_passes == passes
+    app.enter("##exposure", 1.0)
+    app.settle()
+    assert app.window.renderer.lighting_passes == passes, "exposure needs no lighting"
+    app.enter("##radiance", 2.0)
+    app.settle()
+    assert app.window.renderer.lighting_passes > passes
+
+
+def export_pictures(app: Application, out: Path) -> None:
+    for kind in ("png", "exr"):
+        app.window.export(out / f"picture.{kind}", Export(kind, 160, 90, 2))
+        app.until(lambda: not app.window.is_exporting)
+        assert (out / f"picture.{kind}").is_file()
+    shot = replace(
+        app.window.viewport.shot,
+        scene=SCENE,
+        settings=replace(app.window.settings, samples=2),
+        width=160,
+        height=90,
+    )
+    (out / "export.pickle").write_bytes(pickle.dumps(shot))
+
+    asked = []
+    app.window._dialogs.ask_save = lambda *arguments: asked.append(arguments)
+    app.key(CTRL | imgui.Key.e)
+    app.click("###choose file")
+    del app.window._dialogs.ask_save
+    title, _, proposal, then = asked[0]
+    assert title == "Export a picture"
+    assert proposal.suffix == ".png"
+    app.window._export = Export("png", 64, 36, 1)
+    then(out / "dialog.png")
+    app.until(lambda: not app.window.is_exporting)
+    assert (out / "dialog.png").is_file()
+    app.window.export(out / "missing" / "picture.png", Export("png", 16, 9, 1))
+    app.until(lambda: not app.window.is_exporting)
+    assert any("does not exist" in message.text for message in app.window.messages.shown)
+
+
+def failures_become_messages(app: Application, out: Path) -> None:
+    path = out / "broken.json"
+    path.write_text('{"format": "ltc-scene/1", "ligths": []}')
+    app.window.open(path)
+    assert any("ligths" in message.text for message in app.window.messages.shown)
+    assert app.scene == SCENE
+    app.window._dropped.append(str(out / "notes.txt"))
+    app.frame()
+    assert any("notes.txt" in message.text for message in app.window.messages.shown)
+    missing = edits.add_object(SCENE, str(out / "missing.glb"), "missing")[0]
+    app.window.editor.apply("Add a missing mesh", missing)
+    app.settle()
+    assert any("missing.glb" in message.text for message in app.window.messages.shown)
+    app.key(CTRL | imgui.Key.z)
+    app.settle()
+    assert app.window.viewport.samples == (SAMPLES, SAMPLES)
+
+
+def meshes_can_be_dropped(app: Application, out: Path) -> None:
+    path = out / "triangle.obj"
+    path.write_text("v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n")
+    app.window._dropped.append(str(path))
+    app.frame()
+    assert app.scene.objects[-1].name == "triangle"
+    assert np.isclose(app.scene.objects[-1].transform.scale[0], 0.01)
+    app.settle()
+    assert not [m for m in app.window.messages.shown if "triangle" in m.text and m.is_failure]
+
+
+def unsaved_edits_are_asked_about(app: Application, out: Path) -> None:
+    app.click("Add hole")
+    edited = app.scene
+    app.key(CTRL | imgui.Key.q)
+    app.click("###cancel")
+    assert not app.window.params.app_shall_exit
+    assert app.scene == edited
+    app.key(CTRL | imgui.Key.n)
+    app.click("###discard")
+    assert app.scene != edited
+    assert [light.name for light in app.scene.lights] == ["light"]
+    assert not app.window.editor.is_modified
+    app.settle()
+
+
+def names_and_visibility(app: Application, out: Path) -> None:
+    app.act(lambda ctx: ctx.item_input_value("//Light/**/##name", "sun"))
+    assert app.scene.lights[0].name == "sun"
+    assert len(app.window.editor.steps) == 2, "typing a name is one step"
+    app.click("###visible")
+    assert not app.scene.lights[0].visible
+    x, y = app.on_screen(edits.centre_of(SCENE.lights[0]))
+    view = app.window.viewport.view
+    assert app.picture()[round(y - view.y), round(x - view.x)].max() < 60
+    app.key(CTRL | imgui.Key.z)
+    app.key(CTRL | imgui.Key.z)
+    assert app.scene == SCENE
+
+
+def menus_open(app: Application, out: Path) -> None:
+    def walk(ctx) -> None:
+        ctx.set_ref("##MainMenuBar")
+        ctx.menu_click("View/Outlines and handles")
+        ctx.menu_click("View/Outlines and handles")
+
+    app.act(walk)
+    app.act(lambda ctx: (ctx.set_ref("##MainMenuBar"), ctx.menu_click("File/Open demo/###02-quad")))
+    assert app.window.editor.path is None
+    assert app.scene != SCENE
+    for name in ("Camera", "Performance", "Display"):
+        app.act(lambda ctx, name=name: ctx.window_focus(f"//{name}"))
+    app.settle()
+
+
+SCENARIOS = (
+    drag_a_corner,
+    press_a_corner_without_moving_it,
+    escape_cancels_a_drag,
+    change_roughness_by_its_slider,
+    add_and_remove_a_corner,
+    cut_a_hole,
+    add_copy_and_remove_lights,
+    select_by_clicking,
+    look_around,
+    move_and_turn_with_the_gizmo,
+    save_reload_compare,
+    same_picture_as_headless,
+    idle_when_nothing_changes,
+    export_pictures,
+    failures_become_messages,
+    meshes_can_be_dropped,
+    unsaved_edits_are_asked_about,
+    names_and_visibility,
+    menus_open,
+)
+
+
+def main(out: Path, only: list[str]) -> None:
+    results: dict[str, dict[str, object]] = {}
+    app = Application(SCENE)
+    for scenario in SCENARIOS:
+        if only and scenario.__name__ not in only:
+            continue
+        began = time.perf_counter()
+        failure = ""
+        try:
+            start(app)
+            scenario(app, out)
+        except Exception:
+            failure = traceback.format_exc()
+        results[scenario.__name__] = {
+            "failure": failure,
+            "seconds": time.perf_counter() - began,
+        }
+        (out / "results.json").write_text(json.dumps(results, indent=1))
+    app.close()
+    glfw.terminate()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])
