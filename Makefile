@@ -27,7 +27,7 @@ renders: $(STAMP)
 	@set -e; for scene in assets/scenes/*.json; do \
 	    picture=renders/$$(basename "$$scene" .json).png; \
 	    echo "$$picture"; \
-	    $(BIN)/ltc-viewer shot "$$scene" -o "$$picture" --samples 16 >/dev/null; \
+	    $(BIN)/ltc-viewer shot "$$scene" -o "$$picture" --samples 8 >/dev/null; \
 	done
 	@echo "The demo scenes are in $(CURDIR)/renders. There is no display here (DISPLAY and"
 	@echo "WAYLAND_DISPLAY are empty); for the window type 'make run' on a desktop, or log in"
