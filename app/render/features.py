@@ -10,7 +10,7 @@ program.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import moderngl
 
@@ -64,6 +64,7 @@ class LightNeeds:
     """
 
     count: int
+    edges: int
     texels: int
     one_sided: bool
     two_sided: bool
@@ -83,6 +84,7 @@ class LightNeeds:
         rounded = _rounded(texels)
         return cls(
             len(lights),
+            edges,
             texels,
             any(not light.two_sided for light in shining),
             any(light.two_sided for light in shining),
@@ -162,7 +164,7 @@ class LightingFeatures:
         """Return the numbers that the lighting shaders are assembled with."""
         lights = self.lights
         if not self.shades:
-            lights = LightNeeds(lights.count, lights.texels, False, False, lights.uniform_texels)
+            lights = replace(lights, one_sided=False, two_sided=False)
         return {
             "HAS_SPECULAR": int(self.specular),
             "HAS_DIFFUSE": int(self.diffuse),

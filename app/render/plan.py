@@ -269,10 +269,9 @@ def _passes(shot: Shot, features: LightingFeatures) -> tuple[str, ...]:
             lobes = [n for n, on in (("specular", features.specular), ("diffuse", True)) if on]
             if not features.diffuse:
                 lobes.remove("diffuse")
-            edges = features.lights.texels - 4 * features.lights.count
             does.append(
                 f"{' and '.join(lobes)} of {_count(features.lights.count, 'light')} "
-                f"with {_count(edges, 'edge')}"
+                f"with {_count(features.lights.edges, 'edge')}"
             )
         if features.shapes:
             does.append("the radiance of visible lights")

@@ -101,15 +101,16 @@ def test_array_bounds_are_rounded() -> None:
         lights = [replace(KEY, name=str(i), plane=Plane((i, 0, 0))) for i in range(count)]
         return lighting_spec(features(scene(GLOSSY, *lights)))
 
-    # 8 texels a square: blocks of 16, 32, 64 texels and so on.
-    assert len({spec(n) for n in range(1, 9)}) == 3
+    assert len({spec(n) for n in range(1, 9)}) == 4, "one each up to 1, 2, 4 and 8 lights"
 
 
 def test_many_lights_move_to_a_texture() -> None:
     lights = [replace(KEY, name=str(i), plane=Plane((i, 0, 0))) for i in range(200)]
     assert features(scene(GLOSSY, *lights)).lights.uniform_texels == 0
-    large = Limits(uniform_block_bytes=65536)
-    assert LightingFeatures.of(scene(GLOSSY, *lights), 1, large).lights.uniform_texels == 2048
+    large = LightingFeatures.of(scene(GLOSSY, *lights), 1, Limits(uniform_block_bytes=65536))
+    assert large.lights.texels <= large.lights.uniform_texels <= 65536 // 16
+    # Every machine has room for a few lights in a block.
+    assert features(scene(GLOSSY, *lights[:8])).lights.uniform_texels > 0
 
 
 def test_too_much_is_one_sentence() -> None:
