@@ -13,7 +13,7 @@ import pytest
 
 from app.errors import InputError
 from app.render.assemble import ShaderError
-from app.render.features import Limits
+from app.render.features import LightingFeatures, Limits
 from app.render.programs import Programs, ProgramSpec, shader_roots
 from app.render.renderer import Renderer
 from app.render.sampling import FILTER_RADIUS, pixel_offset
@@ -120,7 +120,7 @@ def test_storages_give_the_same_picture(ctx: moderngl.Context, renderer: Rendere
     renderer.render(shot(scene))
     block = renderer.radiance()
     assert any("Lights" in p for p in _blocks(renderer))
-    renderer.limits = Limits(uniform_block_bytes=0)
+    renderer.limits = replace(renderer.limits, uniform_block_bytes=0)
     renderer.render(shot(replace(scene, camera=replace(scene.camera))))
     renderer._stale = True
     renderer.accumulate(shot(scene), 1)
@@ -342,12 +342,14 @@ def _pairs(row: dict[str, int]) -> set[tuple[tuple[str, int], tuple[str, int]]]:
 
 def test_every_pair_of_features_links(ctx: moderngl.Context) -> None:
     programs = Programs(ctx)
+    others = LightingFeatures.of(one_light(), 1, Limits.of(ctx)).defines()
+    assert others.keys() > PAIRED.keys()
     for row in covering_rows():
         features = {
+            **others,
             **row,
             "LIGHT_STORAGE_UNIFORM": int(row["LIGHT_TEXELS"] > 0),
             "MATERIAL_STORAGE_UNIFORM": int(row["MATERIAL_TEXELS"] > 0),
-            "STORAGE_TEXTURE_WIDTH": 1024,
         }
         programs.get(
             ProgramSpec.of("lighting", "passes/fullscreen.vert", "passes/lighting.frag", features)
@@ -360,10 +362,10 @@ def test_every_pair_of_features_links(ctx: moderngl.Context) -> None:
 
 
 def test_limits_are_sentences(renderer: Renderer) -> None:
-    renderer.limits = Limits(texture_side=256)
+    renderer.limits = replace(renderer.limits, texture_side=256)
     with pytest.raises(InputError, match=r"size: 300x36 is too large .* at most 256 pixels"):
         renderer.render(shot(one_light(), width=300))
-    renderer.limits = Limits(uniform_block_bytes=256, texture_side=1)
+    renderer.limits = replace(renderer.limits, uniform_block_bytes=256, texture_side=1)
     with pytest.raises(InputError, match=r"lights: 200 lights with 800 edges .* at most 1024"):
         renderer.render(Shot(many_lights(200), RenderSettings(), 1, 1))
 
