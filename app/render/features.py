@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import moderngl
 
 from app.errors import InputError
+from app.render.arithmetic import has_exact_fma
 from app.render.pack import (
     MAX_INDEX,
     TEXELS_PER_EDGE,
@@ -34,6 +35,7 @@ class Limits:
 
     uniform_block_bytes: int = 16384
     texture_side: int = 16384
+    exact_fma: bool = False
 
     @classmethod
     def of(cls, ctx: moderngl.Context) -> Limits:
@@ -42,6 +44,7 @@ class Limits:
         return cls(
             int(info["GL_MAX_UNIFORM_BLOCK_SIZE"]),
             min(int(info["GL_MAX_TEXTURE_SIZE"]), *(int(side) for side in viewport)),
+            has_exact_fma(ctx),
         )
 
     @property
@@ -69,6 +72,7 @@ class LightNeeds:
     one_sided: bool
     two_sided: bool
     uniform_texels: int
+    exact_fma: bool
 
     @classmethod
     def of(cls, lights: Sequence[AreaLight], limits: Limits) -> LightNeeds:
@@ -89,12 +93,14 @@ class LightNeeds:
             any(not light.two_sided for light in shining),
             any(light.two_sided for light in shining),
             rounded if 16 * rounded <= limits.uniform_block_bytes else 0,
+            limits.exact_fma,
         )
 
     def defines(self) -> dict[str, int]:
         return {
             "HAS_ONE_SIDED": int(self.one_sided),
             "HAS_TWO_SIDED": int(self.two_sided),
+            "HAS_EXACT_FMA": int(self.exact_fma),
             "LIGHT_STORAGE_UNIFORM": int(self.uniform_texels > 0),
             "LIGHT_TEXELS": self.uniform_texels,
             "STORAGE_TEXTURE_WIDTH": STORAGE_TEXTURE_WIDTH,

@@ -18,6 +18,7 @@
 //     edge, with no state between edges; where an edge crosses the horizon, the
 //     crossing's direction is w x z.
 
+#include "common/light_data.glsl"
 #include "ltc/lobe.glsl"
 
 // A transformed light: points are center + s u + t v, (s, t) about the anchor.
@@ -59,30 +60,64 @@ float positive_atan2(float y, float x)
     return x < 0.0 ? 3.14159265359 - angle : angle;
 }
 
-// a.x b.y - a.y b.x to about one unit in the last place (Kahan): fma returns the
-// rounding error of the product that the other fma has to cancel.
+// a b - p for p = a b rounded: what rounding took from the product, exactly.
+#if HAS_EXACT_FMA
+float product_error(float a, float b, float p)
+{
+    return fma(a, b, -p);
+}
+#else
+// Dekker's, for drivers whose fma rounds twice, which GLSL allows.
+float product_error(float a, float b, float p)
+{
+    precise float s = 4097.0 * a;
+    precise float a_high = s - (s - a);
+    precise float a_low = a - a_high;
+    precise float t = 4097.0 * b;
+    precise float b_high = t - (t - b);
+    precise float b_low = b - b_high;
+    precise float error =
+        ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low;
+    return error;
+}
+#endif
+
+// a.x b.y - a.y b.x to about one unit in the last place.
 float cross_2d(vec2 a, vec2 b)
 {
-    float w = a.y * b.x;
-    float e = fma(-a.y, b.x, w);
-    return fma(a.x, b.y, -w) + e;
+    precise float p = a.x * b.y;
+    precise float q = a.y * b.x;
+    precise float d = p - q;
+    return d + (product_error(a.x, b.y, p) - product_error(a.y, b.x, q));
 }
 
-// a . b as an unevaluated sum (high, low): every product and sum keeps its rounding
-// error (Ogita, Rump and Oishi 2005, Dot2). `a_low` adds to a.
-vec2 accurate_dot(vec3 a, vec3 a_low, vec3 b)
+// (x + x_low) - (y + y_low): the difference and, in `low`, what rounding takes from it
+// (Knuth's TwoSum, then renormalised). `precise` keeps compilers from simplifying.
+vec2 accurate_difference(vec2 x, vec2 x_low, vec2 y, vec2 y_low, out vec2 low)
 {
-    precise float p0 = a.x * b.x;
-    precise float p1 = a.y * b.y;
-    precise float p2 = a.z * b.z;
-    precise float s1 = p0 + p1;
-    precise float t1 = s1 - p0;
-    precise float e1 = (p0 - (s1 - t1)) + (p1 - t1);
-    precise float s2 = s1 + p2;
+    precise vec2 d = x - y;
+    precise vec2 back = d - x;
+    precise vec2 error = ((x - (d - back)) - (y + back)) + (x_low - y_low);
+    precise vec2 difference = d + error;
+    precise vec2 rest = error - (difference - d);
+    low = rest;
+    return difference;
+}
+
+// (a + a_low) . (b + b_low) as (high, low): every product and sum keeps its rounding
+// error (Ogita, Rump and Oishi 2005, Dot2).
+vec2 accurate_dot(vec3 a, vec3 a_low, vec3 b, vec3 b_low)
+{
+    precise vec3 p = a * b;
+    precise float s1 = p.x + p.y;
+    precise float t1 = s1 - p.x;
+    precise float e1 = (p.x - (s1 - t1)) + (p.y - t1);
+    precise float s2 = s1 + p.z;
     precise float t2 = s2 - s1;
-    precise float e2 = (s1 - (s2 - t2)) + (p2 - t2);
-    float e0 = fma(a.x, b.x, -p0) + fma(a.y, b.y, -p1) + fma(a.z, b.z, -p2);
-    precise float e = e0 + (e1 + e2) + dot(a_low, b);
+    precise float e2 = (s1 - (s2 - t2)) + (p.z - t2);
+    float e0 = product_error(a.x, b.x, p.x) + product_error(a.y, b.y, p.y) +
+               product_error(a.z, b.z, p.z);
+    precise float e = (e0 + (e1 + e2)) + (dot(a_low, b) + dot(a, b_low));
     precise float high = s2 + e;
     precise float low = e - (high - s2);
     return vec2(high, low);
@@ -93,20 +128,41 @@ struct PlaneView {
     vec3 offset;     // from the point to the light's origin, world
     vec2 foot;       // of the point on the plane
     vec2 foot_low;   // what rounding took from it
-    float depth;     // of the plane along u x v; negative where the light shows its face
+    float depth;     // of the plane along n; negative where the light shows its face
 };
 
-// Compensated, because a light's outline near the foot is known no better than the
-// foot: the error at alpha = .001 falls by a third, beside huge lights by more.
-PlaneView plane_view(vec3 position, vec3 origin, vec3 u, vec3 v)
+PlaneView plane_view(PlanarLight light, vec3 position)
 {
-    precise vec3 offset = origin - position;
-    precise vec3 back = origin - offset;
-    precise vec3 low = (origin - (offset + back)) + (back - position);
-    vec2 s = accurate_dot(offset, low, u);
-    vec2 t = accurate_dot(offset, low, v);
-    float depth = accurate_dot(offset, low, cross(u, v)).x;
-    return PlaneView(offset, -vec2(s.x, t.x), -vec2(s.y, t.y), depth);
+    precise vec3 offset = light.origin - position;
+    precise vec3 back = light.origin - offset;
+    precise vec3 low =
+        ((light.origin - (offset + back)) + (back - position)) + light.origin_low;
+    vec2 s = accurate_dot(offset, low, light.u, light.u_low);
+    vec2 t = accurate_dot(offset, low, light.v, light.v_low);
+    vec2 depth = accurate_dot(offset, low, light.n, light.n_low);
+    return PlaneView(offset, -vec2(s.x, t.x), -vec2(s.y, t.y), depth.x);
+}
+
+// An edge about an anchor in the light's plane: from a to b, d = b - a, moment = a x d.
+struct PlanarEdge {
+    vec2 a;
+    vec2 b;
+    vec2 d;
+    float moment;
+};
+
+PlanarEdge planar_edge(vec4 corners, vec4 corners_low, vec2 anchor, vec2 anchor_low)
+{
+    PlanarEdge edge;
+    vec2 a_low;
+    vec2 d_low;
+    edge.a = accurate_difference(corners.xy, corners_low.xy, anchor, anchor_low, a_low);
+    edge.b = (corners.zw - anchor) + (corners_low.zw - anchor_low);
+    edge.d = accurate_difference(corners.zw, corners_low.zw, corners.xy, corners_low.xy, d_low);
+    edge.moment = cross_2d(edge.a, edge.d) +
+                  ((a_low.x * edge.d.y - a_low.y * edge.d.x) +
+                   (edge.a.x * d_low.y - edge.a.y * d_low.x));
+    return edge;
 }
 
 // Lambert's term of an edge from p to q, w = p x q, the part below z = 0 replaced by
@@ -148,8 +204,9 @@ float pinned_weight(CosineLight light, vec3 d)
     vec3 c = light.center;
     vec3 r = c + d;
     float top = max(r.z, 0.0);
-    float base = max(c.z, 0.0);
-    float excess = dot(d.xy, r.xy + c.xy) + (top - base) * (top + base);
+    // max(r.z, 0) - max(c.z, 0), exactly d.z above the horizon.
+    float rise = max(d.z, -c.z) + min(c.z, 0.0);
+    float excess = dot(d.xy, r.xy + c.xy) + rise * (top + max(c.z, 0.0));
     return -excess * light.pin / (dot(r.xy, r.xy) + top * top);
 }
 
@@ -165,52 +222,54 @@ float pinned_edge(CosineLight light, vec3 dp, vec3 dq, float w_z)
     return w_z * sum;
 }
 
-// Add the edge from a to a + d; `moment` is a x d. All about the anchor.
-void add_edge(CosineLight light, vec2 a, vec2 b, vec2 d, float moment, inout ContourSum sum)
+void add_edge(CosineLight light, PlanarEdge edge, inout ContourSum sum)
 {
-    vec3 dp = a.x * light.u + a.y * light.v;
-    vec3 dq = b.x * light.u + b.y * light.v;
+    vec3 dp = edge.a.x * light.u + edge.a.y * light.v;
+    vec3 dq = edge.b.x * light.u + edge.b.y * light.v;
     vec3 p = light.center + dp;
     vec3 q = light.center + dq;
-    vec3 w = d.x * light.center_cross_u + d.y * light.center_cross_v + moment * light.u_cross_v;
+    vec3 w = edge.d.x * light.center_cross_u + edge.d.y * light.center_cross_v +
+             edge.moment * light.u_cross_v;
     sum.top = max(sum.top, max(p.z, q.z));
     if (light.pin > 0.0) {
-        sum.area += moment;
+        sum.area += edge.moment;
         sum.angle += pinned_edge(light, dp, dq, w.z);
     } else {
         sum.angle += edge_angle(p, q, w);
     }
 }
 
-CosineLight cosine_light(
-    CosineTransform transform, PlaneView view, vec3 u, vec3 v, float radius)
+CosineLight cosine_light(CosineTransform transform, PlanarLight light, PlaneView view)
 {
-    CosineLight light;
-    light.u = transform.points * u;
-    light.v = transform.points * v;
-    vec3 n = cross(u, v);
-    light.u_cross_v = transform.normals * n;
+    CosineLight result;
+    result.u = transform.points * light.u;
+    result.v = transform.points * light.v;
+    result.u_cross_v = transform.normals * light.n;
     vec3 c = transform.points * view.offset;
     float c2 = dot(c, c);
-    float extent2 = radius * radius * (dot(light.u, light.u) + dot(light.v, light.v));
+    float extent2 =
+        light.radius * light.radius * (dot(result.u, result.u) + dot(result.v, result.v));
     if (extent2 < 0.04 * c2) {
-        light.anchor = vec2(0.0);
-        light.anchor_low = vec2(0.0);
-        light.center = c;
-        light.center_cross_u = transform.normals * cross(view.offset, u);
-        light.center_cross_v = transform.normals * cross(view.offset, v);
+        result.anchor = vec2(0.0);
+        result.anchor_low = vec2(0.0);
+        result.center = c;
+        // offset x u and offset x v, from its coordinates (-foot, depth) in (u, v, n).
+        result.center_cross_u =
+            transform.normals * (view.depth * light.v + view.foot.y * light.n);
+        result.center_cross_v =
+            transform.normals * (-view.depth * light.u - view.foot.x * light.n);
         // Where W(center) is below half |center|^2 all of the light is below z = 0.
         float top = max(c.z, 0.0);
-        light.pin = 1.0 / max(dot(c.xy, c.xy) + top * top, 0.5 * c2);
+        result.pin = 1.0 / max(dot(c.xy, c.xy) + top * top, 0.5 * c2);
     } else {
-        light.anchor = view.foot;
-        light.anchor_low = view.foot_low;
-        light.center = transform.points * (view.depth * n);
-        light.center_cross_u = view.depth * (transform.normals * v);
-        light.center_cross_v = -view.depth * (transform.normals * u);
-        light.pin = 0.0;
+        result.anchor = view.foot;
+        result.anchor_low = view.foot_low;
+        result.center = transform.points * (view.depth * light.n);
+        result.center_cross_u = view.depth * (transform.normals * light.v);
+        result.center_cross_v = -view.depth * (transform.normals * light.u);
+        result.pin = 0.0;
     }
-    return light;
+    return result;
 }
 
 // Form factor from the sum over the closed, clipped outline; positive for

@@ -2,6 +2,7 @@
 // radiance, nothing else. Alpha is coverage.
 
 #include "common/octahedron.glsl"
+#include "common/light_data.glsl"
 #include "passes/light_storage.glsl"
 #if HAS_SPECULAR || HAS_DIFFUSE
 #include "passes/material_storage.glsl"
@@ -62,7 +63,7 @@ void main()
         value.a = 1.0;
 #if HAS_SHAPES
         if (surface.w < 0.0) {
-            value.rgb = light_texel(4 * (-1 - int(surface.w)) + 3).rgb;
+            value.rgb = light_radiance(-1 - int(surface.w));
         }
 #endif
 #if HAS_SPECULAR || HAS_DIFFUSE

@@ -31,6 +31,7 @@ def evaluate(
     inputs: Mapping[str, ArrayLike],
     features: Mapping[str, int] | None = None,
     tables: Mapping[str, NDArray[np.float32]] | None = None,
+    prelude: str = "",
 ) -> NDArray[np.float64]:
     """Return ``result``, a vec4 that ``body`` assigns, for every row of the inputs.
 
@@ -46,6 +47,8 @@ def evaluate(
         Converted to float32.
     tables : mapping of str to (rows, columns, channels) float32
         Textures that the body may name as samplers.
+    prelude : str
+        Functions that the library only declares.
 
     Returns
     -------
@@ -58,7 +61,7 @@ def evaluate(
     samplers = [*arrays, *(tables or {})]
     lines = [f'#include "{name}"' for name in includes]
     lines += [f"uniform sampler2D {name}{'_in' if name in arrays else ''};" for name in samplers]
-    lines += ["layout(location = 0) out vec4 result;", "void main()", "{"]
+    lines += ["layout(location = 0) out vec4 result;", prelude, "void main()", "{"]
     lines += ["ivec2 place = ivec2(gl_FragCoord.xy);", "result = vec4(0.0);"]
     for name, value in arrays.items():
         width = value.shape[1]
@@ -95,6 +98,7 @@ def evaluate(
         data = np.frombuffer(target.read(), dtype=np.float32)
         return data.reshape(-1, 4)[:count].astype(np.float64)
     finally:
+        (ctx.screen or ctx.detect_framebuffer(0)).use()  # a released one must not stay bound
         for item in held:
             item.release()
 
