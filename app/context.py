@@ -20,6 +20,11 @@ DEBIAN_PACKAGES = "libegl1 libgl1 libgl1-mesa-dri libx11-6 libxext6"
 
 _INSTALL = f"install it, on Debian or Ubuntu with 'apt-get install {DEBIAN_PACKAGES}'"
 
+_TOO_OLD = (
+    f"the graphics driver refuses OpenGL {GL_VERSION[0]}.{GL_VERSION[1]}: update it, or set "
+    "LIBGL_ALWAYS_SOFTWARE=1 to render on the CPU, and unset MESA_GL_VERSION_OVERRIDE if you set it"
+)
+
 # A part of the driver's or loader's message, and what it means to the user.
 _FAILURES = (
     ("libEGL", f"the system library libEGL is missing: {_INSTALL}"),
@@ -27,7 +32,8 @@ _FAILURES = (
     ("libX11", f"the system library libX11 is missing: {_INSTALL}"),
     (
         "requested device index",
-        f"EGL found no device to render on: {_INSTALL}, for Mesa's software rasteriser at least",
+        "EGL found no device to render on: install a graphics driver, Mesa's software rasteriser "
+        f"at least, on Debian or Ubuntu with 'apt-get install {DEBIAN_PACKAGES}'",
     ),
     (
         "eglInitialize",
@@ -36,20 +42,13 @@ _FAILURES = (
         "and check LIBGL_ALWAYS_SOFTWARE and EGL_PLATFORM if you set them",
     ),
     (
-        "eglGetError",
-        "EGL refused a context: check that the graphics driver offers OpenGL "
-        f"{GL_VERSION[0]}.{GL_VERSION[1]}, or set LIBGL_ALWAYS_SOFTWARE=1",
-    ),
-    (
         "XOpenDisplay",
         "the X display cannot be opened: set DISPLAY to a running X server, or render without "
         "a window ('ltc-viewer shot')",
     ),
-    (
-        "Requested OpenGL version",
-        f"the graphics driver is too old: OpenGL {GL_VERSION[0]}.{GL_VERSION[1]} is needed; "
-        "update it, or set LIBGL_ALWAYS_SOFTWARE=1 to render on the CPU",
-    ),
+    ("eglCreateContext", _TOO_OLD),
+    ("Requested OpenGL version", _TOO_OLD),
+    ("glXCreateContext", _TOO_OLD),
 )
 
 
