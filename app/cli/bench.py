@@ -172,6 +172,8 @@ def _measure(
         ctx.finish()
         elapsed = 1e3 * (time.perf_counter() - start)
         figures = renderer.timings()
+        if renderer.timing_source == "wall clock":
+            figures.pop("cpu", None)  # it would contain the passes
         if index >= warm_up:
             wall.append(elapsed)
             for key, value in figures.items():
@@ -187,7 +189,7 @@ def _table(rows: list[Row], title: str) -> Table:
     table.add_column("technique")
     names = list(dict.fromkeys(name for row in rows for name in row.passes))
     for name in (*names, "wall"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     table.add_column("repeats", justify="right")
     for row in rows:
         cells = [_cell(row.passes.get(name)) for name in names]

@@ -22,6 +22,7 @@ from rich.progress import (
 )
 
 from app.errors import InputError, nearest
+from app.meshes import load_mesh
 from app.render.techniques import TECHNIQUES
 from app.scene import MAX_IMAGE_SIDE, Scene
 from app.scene_io import demo_scenes, load_scene
@@ -109,8 +110,19 @@ def scene_path(name: str) -> Path:
 
 
 def named_scene(name: str) -> Scene:
-    """Load the scene that a SCENE argument means."""
-    return load_scene(scene_path(name))
+    """Load the scene that a SCENE argument means, and its meshes.
+
+    Meshes are cached, so reading them here costs nothing later, and a damaged
+    one is told with its place before anything is drawn.
+    """
+    path = scene_path(name)
+    scene = load_scene(path)
+    for index, item in enumerate(scene.objects):
+        try:
+            load_mesh(item.mesh)
+        except InputError as error:
+            raise InputError(f"{path}: objects[{index}].mesh: {error}") from None
+    return scene
 
 
 def image_size(text: str) -> tuple[int, int]:

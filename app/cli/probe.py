@@ -11,7 +11,14 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from app.cli.common import SceneArgument, Steps, TechniqueOption, headless_renderer, named_scene
+from app.cli.common import (
+    SceneArgument,
+    Steps,
+    TechniqueOption,
+    headless_renderer,
+    messages,
+    named_scene,
+)
 from app.errors import InputError, nearest, os_reason, require_file
 from app.files import check_output, replace_file
 from app.render.techniques import check_technique
@@ -59,6 +66,12 @@ def probe(
     wanted = named_scene(scene)
     settings = RenderSettings(technique=technique)
     count = len(arrays["position"])
+    anisotropic = int(np.count_nonzero(arrays["alpha"][:, 0] != arrays["alpha"][:, 1]))
+    if anisotropic:
+        messages().print(
+            f"{anisotropic} of {count} points are anisotropic: technique {technique} shades them "
+            "with alpha = sqrt(alpha_x alpha_y)."
+        )
     specular = np.zeros((count, 3), dtype=np.float32)
     diffuse = np.zeros((count, 3), dtype=np.float32)
     with headless_renderer() as (_, renderer), Steps("shading points", count) as steps:
