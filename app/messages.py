@@ -34,6 +34,10 @@ class Messages:
     def shown(self) -> tuple[Message, ...]:
         return tuple(self._shown)
 
+    def clear(self) -> None:
+        """Take all messages away."""
+        self._shown.clear()
+
     def note(self, text: str) -> None:
         """Say something that went well."""
         self._add(text, False, NOTE_SECONDS)

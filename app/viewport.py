@@ -40,6 +40,8 @@ SMALLEST = 4
 """Most that width and height of a moving picture are divided by."""
 LEAST_ASPECT = 1.5
 WIDEST = math.radians(150.0)
+UNDER_STATUS_BAR = 1
+"""Points by which hello_imgui's status bar covers the docked windows."""
 
 HANDLE = 9.0
 """Half the side of the square in which a corner can be grabbed, in points."""
@@ -212,9 +214,11 @@ class Viewport:
     def _place(self) -> None:
         corner, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
         ratio = imgui.get_io().display_framebuffer_scale
-        width, height = max(int(room.x), 16), max(int(room.y), 16)
+        x, y = math.ceil(corner.x), math.ceil(corner.y)
+        width = max(math.floor(corner.x + room.x) - x, 16)
+        height = max(math.floor(corner.y + room.y) - y - UNDER_STATUS_BAR, 16)
         pixels = (max(round(width * ratio.x), 1), max(round(height * ratio.y), 1))
-        self.view = View(round(corner.x), round(corner.y), width, height, pixels)
+        self.view = View(x, y, width, height, pixels)
 
     # --- pointer and camera ------------------------------------------------------
 
@@ -422,8 +426,9 @@ class Viewport:
     def _render(self, scene: Scene, settings: RenderSettings) -> None:
         """Add a sample unless the picture has all of them; never let a failure out."""
         now = time.monotonic()
-        if scene is not self._wanted:
-            self._wanted, self._changed_at = scene, now
+        if self._wanted is None or _other_radiance(self._wanted, scene):
+            self._changed_at = now
+        self._wanted = scene
         moving = now - self._changed_at < SETTLE
         width, height = self.view.pixels
         divisor = 1
@@ -591,6 +596,16 @@ class Viewport:
         low, high = ImVec2(x - pad, y - 0.5 * pad), ImVec2(x + size.x + pad, y + size.y + 0.5 * pad)
         draw.add_rect_filled(low, high, theme.u32(theme.grey(0.06), 0.72), 6.0)
         draw.add_text(ImVec2(x, y), theme.u32(theme.grey(0.86)), self.help)
+
+
+def _other_radiance(a: Scene, b: Scene) -> bool:
+    """Tell whether two scenes may differ in more than exposure and tone map."""
+    return not (
+        a.camera is b.camera
+        and a.lights is b.lights
+        and a.objects is b.objects
+        and a.materials is b.materials
+    )
 
 
 def _remove_outline(light: AreaLight, vertex: tuple[int, int]) -> AreaLight:

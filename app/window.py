@@ -18,6 +18,7 @@ import contextlib
 import sys
 import time
 import traceback
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -496,6 +497,7 @@ class Window:
     def show(self, scene: Scene, path: Path | None) -> None:
         """Show another scene with a fresh history."""
         self.editor.open(scene, path)
+        self.messages.clear()
         self._light = 0
         self._material = scene.objects[0].material if scene.objects else ""
         self._select_first()
@@ -810,10 +812,12 @@ def first_scene(path: Path | None) -> tuple[Scene, Path | None]:
 
 def missing_display() -> str | None:
     """Return the sentence for a machine on which no window can be opened, None if one can."""
-    try:
-        started = bool(glfw.init())
-    except Exception:
-        started = False
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            started = bool(glfw.init())
+        except glfw.GLFWError:
+            started = False
     if started:
         return None
     return (

@@ -103,7 +103,7 @@ def _shape(light: AreaLight, vertex: tuple[int, int] | None) -> tuple[AreaLight,
         )  # fmt: skip
         if rule != light.outline.fill_rule:
             light = replace(light, outline=replace(light.outline, fill_rule=rule))
-    if vertex is not None:
+    if vertex is not None and vertex[0] < len(light.outline.contours):
         contour, point = vertex
         at = light.outline.contours[contour].points[point]
         s, t = numbers(

@@ -13,9 +13,7 @@ import imgui_bundle  # noqa: F401  (first: glfw then takes the library that imgu
 import glfw
 # isort: on
 
-import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -94,6 +92,7 @@ class Application:
         """Return the viewport's part of the window, settled, without anything drawn over it."""
         viewport = self.window.viewport
         viewport.show_overlays = False
+        self.window.messages.clear()
         self.settle()
         pixels = self.pixels()
         viewport.show_overlays = True
@@ -190,19 +189,3 @@ class Application:
         chosen = self.scene.lights[light]
         point = chosen.outline.contours[vertex[0]].points[vertex[1]]
         return self.on_screen(edits.point_on(chosen.plane, point))
-
-
-def is_possible() -> str | None:
-    """Return why the window cannot be tested here, None if it can."""
-    import sys
-
-    if not sys.platform.startswith("linux"):
-        return "GLFW's null platform with EGL is tested on Linux"
-    if not hasattr(glfw, "PLATFORM_NULL"):
-        return "this GLFW has no null platform"
-    if os.environ.get("LTC_SKIP_GUI"):
-        return "LTC_SKIP_GUI is set"
-    return None
-
-
-TEMPORARY = Path(os.environ.get("LTC_GUI_OUT", "."))
