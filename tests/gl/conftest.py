@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 import moderngl
 import numpy as np
@@ -12,11 +13,15 @@ from app.context import headless_context
 from app.render.renderer import Renderer
 
 
+@cache
+def process_context() -> moderngl.Context:
+    """Return the one context of this process; it lives as long."""
+    return headless_context()
+
+
 @pytest.fixture(scope="session")
-def session_context() -> Iterator[moderngl.Context]:
-    context = headless_context()
-    yield context
-    context.release()
+def session_context() -> moderngl.Context:
+    return process_context()
 
 
 @pytest.fixture
