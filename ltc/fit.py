@@ -55,13 +55,15 @@ THETA_MAX = np.radians(89.9)
 
 _ENTRIES = ((0, 0), (0, 2), (1, 1), (2, 0))  # of X, in the order of the table's channels
 _ALBEDO_COSINE = 1e-7  # in units of alpha; stands for a view exactly in the surface
-_CHUNK = 2048  # configurations per piece of work between two saves
+_CHUNK = 2048  # configurations per piece of work
+_SAVE_EVERY = 1.0  # seconds between checkpoints while the exact integrals are computed
 _EPSILON = 1e-3  # below this error the loss is quadratic, above it absolute
 _TAIL = 50.0  # weight of the squared error beside the absolute one
 _VARIATION = 0.03  # weight of the total variation
+_RELATIVE_FLOOR = 0.05  # relative errors of the density below this count as squares
 _SMOOTHNESS = 1e-6  # weight of squared second differences of the residual
 _LOBES, _DIRECTIONS = 2000, 64  # views, and directions each, in the total variation
-_SMALLEST_FACTOR = 0.05  # of det(I + X) anywhere on the table
+_FACTOR_MARGIN = 0.15  # factors of det(I + X) smaller than this are penalised, by squares
 _DAMPING, _DAMPING_MIN, _DAMPING_MAX = 1e-4, 1e-7, 1e6
 _STEPS, _STEP_GAIN = 40, 1e-4  # most steps; stop when a step gains less than this share
 
@@ -398,8 +400,9 @@ class LobeVariation:
         weight = self.weight[part]
         error, slope = (q - self.ggx[part]) * weight, dq * weight[..., None]
         views, directions = self.x.size, weight.shape[1]
-        softened = np.sqrt(error * error + (0.025 / directions) ** 2)
-        loss = _VARIATION * float(np.sum(np.abs(error))) / views
+        floor = _RELATIVE_FLOOR * 0.5 / directions
+        softened = np.sqrt(error * error + floor * floor)
+        loss = _VARIATION * float(np.sum(softened - floor)) / views
         w = _VARIATION / views / softened
         curvature = np.einsum("nk,nki,nkj->nij", w, slope, slope, optimize=True)
         return loss, curvature, np.einsum("nk,nki->ni", w * error, slope)
@@ -434,13 +437,24 @@ def fit_steps(state: FitState, shading: ShadingError, lobes: LobeVariation) -> I
 
     def equations(z: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         p = (tie @ z).reshape(size * size, 4)
-        X00, X02, X11, X20 = (guard_weights @ p).T
-        factors = (1.0 + X00 - (1.0 - guard_cosine**2) * X02 * X20, 1.0 + X11)
-        if min(float(np.min(f)) for f in factors) < _SMALLEST_FACTOR:
-            return np.inf, smoothness, z
         loss = 0.5 * float(z @ smoothness @ z)
         H = np.zeros((size * size, 4, size * size, 4))
         g = np.zeros((size * size, 4))
+        X00, X02, X11, X20 = (guard_weights @ p).T
+        s2 = 1.0 - guard_cosine**2
+        for factor, change in (
+            (1.0 + X00 - s2 * X02 * X20, (np.ones_like(s2), -s2 * X20, 0.0 * s2, -s2 * X02)),
+            (1.0 + X11, (0.0 * s2, 0.0 * s2, np.ones_like(s2), 0.0 * s2)),
+        ):
+            if np.min(factor) <= 0.0:
+                return np.inf, smoothness, z
+            near = factor < _FACTOR_MARGIN
+            short = factor[near] - _FACTOR_MARGIN
+            loss += 0.5 * float(short @ short)
+            J = np.stack(change, axis=-1)[near][:, None, :] * guard_weights[near][:, :, None]
+            flat = J.reshape(-1, 4 * size * size)
+            H += (flat.T @ flat).reshape(H.shape)
+            g += (short @ flat).reshape(g.shape)
         for term in (shading, lobes):
             for first in range(0, term.x.size, _CHUNK):
                 part = slice(first, first + _CHUNK)
@@ -668,7 +682,7 @@ def _add_targets(work: _Work, cases: Configurations, checkpoint: Path, report: R
         chunk = Configurations(cases.alpha[part], cases.cos_theta[part], cases.corners[part])
         work.exact = np.concatenate([work.exact, exact_integrals(chunk)])
         now, done = time.monotonic() - begin, work.exact.size
-        if now - saved > 1.0 or done == count:
+        if now - saved > _SAVE_EVERY or done == count:
             saved = now
             work.save(checkpoint)
             left = now / (done - start) * (count - done)
