@@ -38,6 +38,9 @@ MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 CREASE = math.radians(44.0)
 """Edges that bend by more stay sharp; just under a right angle's half, so octagons do too."""
 
+SAME_PLACE = 2.0**20
+"""Vertices are one place for smoothing if they agree to this fraction of the extent."""
+
 SPHERE_SECTORS, SPHERE_STACKS = 160, 80
 """The sphere's chords are within 2e-4 radii of it."""
 
@@ -327,7 +330,7 @@ def _finished(piece: _Piece, path: Path) -> tuple[FloatArray, FloatArray, FloatA
     normals = _unit_or_none(piece.normals, faces)
     source = np.arange(len(positions))
     if normals is None:
-        source, faces, normals = _smooth_normals(rounded, faces)
+        source, faces, normals = _smooth_normals(rounded, faces, piece.uv is not None)
     keep, flat = np.unique(faces, return_inverse=True)
     faces = flat.reshape(-1, 3)
     positions, normals, source = rounded[source[keep]], normals[keep], source[keep]
@@ -353,12 +356,14 @@ def _unit_or_none(normals: FloatArray | None, faces: IntArray) -> FloatArray | N
 
 
 def _smooth_normals(
-    positions: FloatArray, faces: IntArray
+    positions: FloatArray, faces: IntArray, keep_apart: bool
 ) -> tuple[IntArray, IntArray, FloatArray]:
     """Make normals per smoothing group, weighted by the corners' angles.
 
     Corners of two triangles that share an edge (by position) bending less than
-    `CREASE` join one group at each end of that edge; each group becomes a vertex.
+    `CREASE` join one group at each end of that edge, with one normal. With
+    ``keep_apart`` the file's vertices are not merged even where they coincide,
+    because their texture coordinates differ.
 
     Returns
     -------
@@ -372,7 +377,10 @@ def _smooth_normals(
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    _, place = np.unique(positions, axis=0, return_inverse=True)
+    # Exporters leave poles and seams apart by rounding: nearly equal places are one.
+    extent = float(np.ptp(positions[faces.ravel()], axis=0).max())
+    cells = np.rint(positions * (SAME_PLACE / extent))
+    _, place = np.unique(cells, axis=0, return_inverse=True)
     place = place.reshape(-1)[faces]
     corners = positions[faces]
     face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -390,13 +398,14 @@ def _smooth_normals(
     first, second = order[:-1], order[1:]
     same = (low[first] == low[second]) & (high[first] == high[second])
     bend = np.sum(face_normals[first // 3] * face_normals[second // 3], axis=1)
-    joined = same & (bend > math.cos(CREASE))
+    joined = same & (bend > math.cos(CREASE)) & (first // 3 != second // 3)
     first, second = first[joined], second[joined]
 
     rows = np.concatenate((low_corner[first], high_corner[first]))
     columns = np.concatenate((low_corner[second], high_corner[second]))
     links = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(faces.size, faces.size))
     count, group = connected_components(links, directed=False)
+    group = group.astype(np.int64)
 
     ahead = np.roll(corners, -1, axis=1) - corners
     behind = np.roll(corners, 1, axis=1) - corners
@@ -406,13 +415,19 @@ def _smooth_normals(
     normals = np.zeros((count, 3))
     np.add.at(normals, group, (angle[..., None] * face_normals[:, None, :]).reshape(-1, 3))
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    source = np.zeros(count, dtype=np.int64)
-    source[group] = faces.ravel()
     # A group folded onto itself cancels: there any of its triangles' normals serves.
     fallback = np.zeros((count, 3))
     fallback[group] = np.repeat(face_normals, 3, axis=0)
     normals = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), fallback)
-    return source, group.astype(np.int64).reshape(-1, 3), normals
+    # In a group one vertex for each exact position; for each of the file's where those differ.
+    exact = faces.ravel()
+    if not keep_apart:
+        _, exact = np.unique(positions, axis=0, return_inverse=True)
+        exact = exact.reshape(-1)[faces.ravel()]
+    _, some, vertex = np.unique(
+        group * len(positions) + exact, return_index=True, return_inverse=True
+    )
+    return faces.ravel()[some], vertex.reshape(-1, 3).astype(np.int64), normals[group[some]]
 
 
 def parallel_tangents(normals: FloatArray) -> FloatArray:
