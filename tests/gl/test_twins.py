@@ -1,0 +1,321 @@
+"""Functions of ``shaders/ltc`` against their float64 definitions, one pixel a call.
+
+`TWINS` lists every function with a test here; `GPU_ONLY` says why others have none of
+their own. A function in neither list fails `test_every_function_is_listed`.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from app.render.pack import LIGHT_HEADER
+from app.render.tables import isotropic_textures
+from ltc import table
+from ltc.polygon import clipped_form_factor
+from ltc.resources import resource_path
+from tests.gl.evaluate import evaluate
+
+FEATURES = {"HAS_SPECULAR": 1, "HAS_DIFFUSE": 1, "HAS_EXACT_FMA": 0}
+NO_LIGHTS = "vec4 light_texel(int index) { return vec4(0.0); }"
+COUNT = 4096
+
+TWINS = {
+    "table_coordinates",
+    "table_bilinear",
+    "albedo_terms",
+    "isotropic_lobe",
+    "cosine_transform",
+    "positive_atan2",
+    "product_error",
+    "cross_2d",
+    "accurate_difference",
+    "accurate_dot",
+    "plane_view",
+    "planar_edge",
+    "edge_angle",
+    "cosine_light",
+}
+THROUGH_PROBE = "a stage of the integral, tested whole by test_probe.py"
+GPU_ONLY = {
+    "pinned_weight": THROUGH_PROBE,
+    "pinned_edge": THROUGH_PROBE,
+    "add_edge": THROUGH_PROBE,
+    "form_factor": THROUGH_PROBE,
+    "light_form_factor": THROUGH_PROBE,
+    "light_form_factors": THROUGH_PROBE,
+    "surface_point": THROUGH_PROBE,
+    "specular_lobe": THROUGH_PROBE,
+    "probe_lights": THROUGH_PROBE,
+    "shade_lights": "the probe's sum weighted by a material, tested by test_renderer.py",
+}
+
+
+def test_every_function_is_listed():
+    found = set()
+    for path in resource_path("shaders", "ltc").glob("*.glsl"):
+        text = re.sub(r"//[^\n]*|^\s*#[^\n]*", "", path.read_text(encoding="utf-8"), flags=re.M)
+        found |= set(re.findall(r"^\w+ (\w+)\(", text, flags=re.M))
+    assert found == TWINS | set(GPU_ONLY)
+    assert not TWINS & set(GPU_ONLY)
+
+
+@pytest.fixture
+def glsl(ctx, tmp_path):
+    def run(include, body, inputs, **keywords):
+        keywords.setdefault("prelude", NO_LIGHTS)
+        return evaluate(ctx, tmp_path, [include], body, inputs, FEATURES, **keywords)
+
+    return run
+
+
+def f32(values):
+    """Rounded to what the GPU gets, in float64."""
+    return np.asarray(values, dtype=np.float32).astype(np.float64)
+
+
+def alphas_and_cosines(rng):
+    alpha = f32(np.exp(rng.uniform(np.log(1e-4), 0.0, COUNT)))
+    theta = np.radians(np.where(rng.uniform(size=COUNT) < 0.5, rng.uniform(0, 90, COUNT),
+                                90 - 10 ** rng.uniform(-2, 1.9, COUNT)))  # fmt: skip
+    return alpha, f32(np.sin(theta)), f32(np.cos(theta))
+
+
+def test_table_coordinates(glsl):
+    alpha, _, c = alphas_and_cosines(np.random.default_rng(0))
+    got = glsl(
+        "ltc/table.glsl", "result.xy = table_coordinates(alpha, c);", {"alpha": alpha, "c": c}
+    )
+    want = np.stack(table.table_coordinates(alpha, c), axis=-1)
+    np.testing.assert_allclose(got[:, :2], want, rtol=3e-7, atol=1e-7)
+
+
+def test_table_bilinear_and_albedo_terms(glsl):
+    alpha, s, c = alphas_and_cosines(np.random.default_rng(1))
+    residual, albedo = isotropic_textures()
+    body = """
+        vec2 at = table_coordinates(alpha, c);
+        result = vec4(albedo_terms(table_bilinear(albedo, at).rg, alpha, s, c), 0.0, 0.0);
+    """
+    inputs = {"alpha": alpha, "s": s, "c": c}
+    got = glsl("ltc/table.glsl", body, inputs, tables={"albedo": albedo})
+    _, A, B = table.sample_textures((residual, albedo), alpha, c)
+    np.testing.assert_allclose(got[:, 0], A, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(got[:, 1], B, rtol=0, atol=2e-6)
+
+
+def lobes(rng):
+    alpha, s, c = alphas_and_cosines(rng)
+    residual, albedo = isotropic_textures()
+    M, _, _ = table.sample_textures((residual, albedo), alpha, c)
+    inverse = np.linalg.inv(M)
+    inverse *= alpha[:, None, None]  # as the shader scales it, up to |M's third column|
+    return alpha, s, c, residual, M, inverse
+
+
+LOBE = """
+    vec2 at = table_coordinates(alpha, c);
+    IsotropicLobe lobe = isotropic_lobe(alpha, s, c, table_bilinear(residual, at));
+"""
+
+
+def test_isotropic_lobe(ctx, tmp_path):
+    alpha, s, c, residual, M, inverse = lobes(np.random.default_rng(2))
+    inputs = {"alpha": alpha, "s": s, "c": c}
+
+    def run(result):
+        return evaluate(
+            ctx, tmp_path, ["ltc/table.glsl", "ltc/lobe.glsl"], f"{LOBE} result = {result};",
+            inputs, FEATURES, {"residual": residual},
+        )  # fmt: skip
+
+    rows = run("vec4(lobe.row0, lobe.row2)")
+    rest = run("vec4(lobe.row1, lobe.det, lobe.above, 0.0)")
+    # Both are free up to a factor: compare relative to the middle entry.
+    scale = rest[:, 0] / inverse[:, 1, 1]
+    want = np.stack(
+        [inverse[:, 0, 0], inverse[:, 0, 2], inverse[:, 2, 0], inverse[:, 2, 2]], axis=-1
+    )
+    want *= scale[:, None]
+    size = np.abs(rows).max(axis=1)
+    assert np.abs(rows - want).max(axis=1).max() <= 1e-5 * size.max()
+    # The first row sets where the lobe points: its direction matters most.
+    turn = rows[:, 0] * want[:, 1] - rows[:, 1] * want[:, 0]
+    turn /= np.hypot(rows[:, 0], rows[:, 1]) * np.hypot(want[:, 0], want[:, 1])
+    # c alone, rounded, says the view's angle to 6e-8 / s; the shader has s beside it.
+    away = s > 0.1
+    assert np.percentile(np.abs(turn[away]), 99) <= 1e-6
+    assert np.abs(turn).max() <= 1e-5
+    det = rows[:, 0] * rows[:, 3] - rows[:, 1] * rows[:, 2]
+    assert np.all(rest[:, 1] > 0.0)
+    rough = alpha > 0.1  # below, the difference itself cancels: that is what `det` is for
+    np.testing.assert_allclose(rest[rough, 1], det[rough], rtol=2e-4)
+    np.testing.assert_allclose(rest[:, 2], table.lobe_above_horizon(M), atol=1e-6)
+
+
+def test_cosine_transform_normals_are_cofactors(glsl):
+    """(K p) x (K q) = normals (p x q), up to a positive factor."""
+    rng = np.random.default_rng(3)
+    alpha, s, c = alphas_and_cosines(rng)
+    rough = alpha > 0.05
+    inputs = {"alpha": alpha[rough], "s": s[rough], "c": c[rough],
+              "p": rng.normal(size=(COUNT, 3))[rough], "q": rng.normal(size=(COUNT, 3))[rough],
+              "r": rng.normal(size=(COUNT, 4))[rough]}  # fmt: skip
+    body = """
+        IsotropicLobe lobe = isotropic_lobe(alpha, s, c, 0.1 * r / (1.0 + abs(r)));
+        vec3 n = normalize(r.xyz);
+        ViewFrame frame = view_aligned_frame(n, normalize(r.yzw + vec3(0.1)));
+        CosineTransform t = cosine_transform(lobe, frame.world_from_shading);
+        vec3 a = cross(t.points * p, t.points * q);
+        vec3 b = t.normals * cross(p, q);
+        result = vec4(a / length(a) - b / length(b), 0.0);
+    """
+    got = glsl("ltc/shade.glsl", body, inputs)
+    assert np.abs(got).max() <= 2e-4
+    assert np.percentile(np.abs(got), 99) <= 1e-5
+
+
+def test_positive_atan2(glsl):
+    rng = np.random.default_rng(4)
+    y = f32(10 ** rng.uniform(-12, 6, COUNT))
+    x = f32(10 ** rng.uniform(-12, 6, COUNT) * rng.choice([-1, 1], COUNT))
+    y[:3], x[:3] = [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]
+    got = glsl("ltc/polygon.glsl", "result.x = positive_atan2(y, x);", {"x": x, "y": y})[:, 0]
+    np.testing.assert_allclose(got, np.arctan2(y, x), rtol=4e-7)
+
+
+def near_parallel(rng):
+    a = f32(rng.normal(size=(COUNT, 2)))
+    return a, f32(a * rng.normal(size=(COUNT, 1)) + 1e-5 * rng.normal(size=(COUNT, 2)))
+
+
+def test_product_error(glsl):
+    rng = np.random.default_rng(5)
+    a, b = f32(rng.normal(size=COUNT)), f32(rng.normal(size=COUNT))
+    body = "precise float p = a * b; result.x = product_error(a, b, p); result.y = p;"
+    got = glsl("ltc/polygon.glsl", body, {"a": a, "b": b})
+    np.testing.assert_array_equal(got[:, 0] + got[:, 1], a * b)
+
+
+def test_cross_2d(glsl):
+    a, b = near_parallel(np.random.default_rng(6))
+    got = glsl("ltc/polygon.glsl", "result.x = cross_2d(a, b);", {"a": a, "b": b})[:, 0]
+    want = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    np.testing.assert_allclose(got, want, rtol=3e-7, atol=1e-14)
+
+
+def test_accurate_difference(glsl):
+    rng = np.random.default_rng(7)
+    x = rng.normal(size=(COUNT, 2))
+    y = x * (1.0 + 1e-6 * rng.normal(size=(COUNT, 2)))
+    x_high, y_high = f32(x), f32(y)
+    inputs = {"x": np.hstack([x_high, x - x_high]), "y": np.hstack([y_high, y - y_high])}
+    body = """
+        vec2 low;
+        result.xy = accurate_difference(x.xy, x.zw, y.xy, y.zw, low);
+        result.zw = low;
+    """
+    got = glsl("ltc/polygon.glsl", body, inputs)
+    np.testing.assert_allclose(got[:, :2] + got[:, 2:], x - y, rtol=0, atol=1e-13)
+
+
+def test_accurate_dot(glsl):
+    rng = np.random.default_rng(8)
+    a, b = rng.normal(size=(2, COUNT, 3))
+    a -= b * (np.sum(a * b, axis=1) / np.sum(b * b, axis=1))[:, None] * (1.0 - 1e-6)
+    a_high, b_high = f32(a), f32(b)
+    inputs = {"a": a_high, "a_low": a - a_high, "b": b_high, "b_low": b - b_high}
+    got = glsl("ltc/polygon.glsl", "result.xy = accurate_dot(a, a_low, b, b_low);", inputs)
+    want = np.sum(a * b, axis=1)
+    # Nearly orthogonal by design: results near 1e-6 keep seven digits.
+    np.testing.assert_allclose(got[:, 0] + got[:, 1], want, rtol=0, atol=3e-13)
+
+
+def test_light_header_and_plane_view(glsl):
+    """A header packed by numpy, read by GLSL: the foot to 1e-12, a metre away."""
+    rng = np.random.default_rng(9)
+    basis = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    if np.linalg.det(basis) < 0:
+        basis[2] *= -1
+    u, v, n = basis
+    origin = rng.normal(size=3)
+    header = np.zeros(1, dtype=LIGHT_HEADER)[0]
+    for name, vector in (("origin", origin), ("u", u), ("v", v), ("n", n)):
+        header[name] = vector
+        header[f"{name}_low"] = vector - header[name].astype(np.float64)
+    header["radius"], header["edge_count"], header["first_edge"] = 2.0, 5.0, 8.0
+    texels = np.array([header]).view(np.float32).reshape(-1, 4)
+    prelude = (
+        "vec4 light_texel(int index) { const vec4 t[8] = vec4[]("
+        + ", ".join(f"vec4({', '.join(f'{float(x):.9e}' for x in row)})" for row in texels)
+        + "); return t[index]; }"
+    )
+    position = f32(rng.normal(size=(COUNT, 3)))
+    body = """
+        PlaneView view = plane_view(light_at(0), position);
+        result = vec4(view.foot + view.foot_low * 0.0, view.foot_low);
+    """
+    got = glsl("ltc/polygon.glsl", body, {"position": position}, prelude=prelude)
+    want = (position - origin) @ basis[:2].T
+    np.testing.assert_allclose(got[:, :2] + got[:, 2:], want, rtol=0, atol=1e-12)
+    body = "result.x = plane_view(light_at(0), position).depth; result.y = light_at(0).radius;"
+    got = glsl("ltc/polygon.glsl", body, {"position": position}, prelude=prelude)
+    np.testing.assert_allclose(got[:, 0], (origin - position) @ n, rtol=2e-7, atol=1e-12)
+    assert np.all(got[:, 1] == 2.0)
+
+
+def test_planar_edge_moment(glsl):
+    """The moment of an edge that passes 1e-6 from the anchor, its ends a metre away."""
+    rng = np.random.default_rng(10)
+    direction = rng.normal(size=(COUNT, 2))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    normal = np.stack([-direction[:, 1], direction[:, 0]], axis=-1)
+    anchor = rng.normal(size=(COUNT, 2))
+    middle = anchor + 1e-6 * rng.uniform(0.5, 1.0, (COUNT, 1)) * normal
+    corners = np.hstack([middle - direction, middle + direction])
+    high, anchor_high = f32(corners), f32(anchor)
+    inputs = {"high": high, "low": corners - high,
+              "anchor": np.hstack([anchor_high, anchor - anchor_high])}  # fmt: skip
+    body = "result.x = planar_edge(high, low, anchor.xy, anchor.zw).moment;"
+    got = glsl("ltc/polygon.glsl", body, inputs)[:, 0]
+    a, d = corners[:, :2] - anchor, corners[:, 2:] - corners[:, :2]
+    np.testing.assert_allclose(got, a[:, 0] * d[:, 1] - a[:, 1] * d[:, 0], rtol=1e-6)
+
+
+def test_edge_angle_sums_to_the_form_factor(glsl):
+    """Triangles anywhere about the horizon, against the clipped polygon in float64."""
+    rng = np.random.default_rng(11)
+    a, b, c = f32(rng.normal(size=(3, COUNT, 3)))
+    # Azimuths replace what is below the horizon: a triangle over the nadir counts 1 more.
+    inside = np.linalg.solve(
+        np.stack([a, b, c], axis=-1), np.broadcast_to([[0.0], [0.0], [-1.0]], (COUNT, 3, 1))
+    )
+    nadir = np.all(inside[..., 0] > 0, axis=1)
+    body = """
+        result.x = edge_angle(a, b, cross(a, b)) + edge_angle(b, c, cross(b, c)) +
+                   edge_angle(c, a, cross(c, a));
+    """
+    got = glsl("ltc/polygon.glsl", body, {"a": a, "b": b, "c": c})[:, 0] / (2.0 * np.pi)
+    want = clipped_form_factor(np.stack([a, b, c], axis=-2))
+    keep = ~nadir
+    np.testing.assert_allclose(got[keep], want[keep], rtol=0, atol=3e-6)
+
+
+def test_cosine_light_pins_small_lights(glsl):
+    rng = np.random.default_rng(12)
+    distance = 10 ** rng.uniform(-1, 3, COUNT)
+    body = """
+        PlanarLight light;
+        light.u = vec3(1.0, 0.0, 0.0);
+        light.v = vec3(0.0, 1.0, 0.0);
+        light.n = vec3(0.0, 0.0, 1.0);
+        light.radius = 1.0;
+        PlaneView view = PlaneView(vec3(0.0, 0.0, d), vec2(0.0), vec2(0.0), d);
+        result.x = cosine_light(CosineTransform(mat3(1.0), mat3(1.0)), light, view).pin;
+    """
+    got = glsl("ltc/polygon.glsl", body, {"d": distance})[:, 0]
+    far = f32(distance) > np.sqrt(2.0 / 0.04)
+    np.testing.assert_allclose(got[far], 1.0 / f32(distance)[far] ** 2, rtol=1e-6)
+    assert not got[~far].any()
