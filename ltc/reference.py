@@ -6,6 +6,19 @@ samples visible normals and asks whether they reflect the viewer into the light.
 `specular_area_integral` walks over the light itself, which needs a rough
 surface. They share nothing but `ltc.brdf`, and the last two not the space either.
 
+Why the boundary suffices. Let S = diag(1/ax, 1/ay, 1), v' = S^-1 v normalised
+and h' = S (v + o) for the light direction o. GGX's visible normals then have the
+density 2/(1 + v'_z) (v'.h')/pi over the directions of h': a cosine about v',
+cut at the horizon. The map from o to h' is one to one above the surface, so the
+light's image is the region inside the image of its outline, and the integral of
+f cos is that of density times G2/G1 over it. Those light directions that are above
+the surface fill a convex cone (`ltc.brdf.horizon_cone`), so chords from a
+point of the cone to the outline stay where the integrand is smooth, and the signed
+fan of chords covers the region once, whatever its shape and its holes.
+
+A point that lies exactly on an outline, to rounding, has no defined
+integral: the result is then finite, but may exceed the albedo.
+
 Lights have radiance 1; loops count positive counter-clockwise about +z, like
 `ltc.polygon`. For Schlick's f0 the integral is f0 (one - fresnel) + fresnel.
 """
@@ -371,9 +384,8 @@ def _core(
 ) -> FloatArray:
     """Return (3, n): integrals over the light edges a -> b, (m, 3), of configuration ``which``.
 
-    Rows are F = 1, the Fresnel part, and an estimate of the error.
-
-    Edges are clipped to the horizon; those of one configuration form closed loops.
+    Rows are F = 1, the Fresnel part, and an estimate of the error. Edges are
+    clipped to the horizon; those of one configuration form closed loops.
     """
     n = wo.shape[0]
     result = np.zeros((3, n))
@@ -391,10 +403,13 @@ def _core(
     o1 = np.cross(normal / length[:, None], o0)
     sweep = np.arctan2(length, _dot(a, b))
 
+    def on_edge(e: IntArray, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
+        cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]
+        return o0[e] * cos + o1[e] * sin, o1[e] * cos - o0[e] * sin
+
     def edge_ready(e: IntArray, m: FloatArray, half: FloatArray) -> BoolArray:
         i = which[e]
-        cos, sin = np.cos(m)[:, None], np.sin(m)[:, None]
-        o, do = o0[e] * cos + o1[e] * sin, o1[e] * cos - o0[e] * sin
+        o, do = on_edge(e, m)
         ready = half < 0.4
         # h' and (ax o_x, ay o_y, o_z), the roots of whose squares are the poles, bend by o'' = -o.
         for x, dx, bend in ((wo[i] + o, do, S[i]), (o, do, L[i])):
@@ -417,8 +432,7 @@ def _core(
         w_phi = ((hi - lo)[:, None] * w).ravel()
         e_phi = np.repeat(e, nodes)
         i = which[e_phi]
-        cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]
-        o, do = o0[e_phi] * cos + o1[e_phi] * sin, o1[e_phi] * cos - o0[e_phi] * sin
+        o, do = on_edge(e_phi, phi)
         h, dh = S[i] * (wo[i] + o), S[i] * do
         h2 = _dot(h, h)
         u = h / np.sqrt(h2)[:, None]

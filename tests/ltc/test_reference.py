@@ -59,6 +59,24 @@ def test_boundary_against_area(isotropic: bool, rng: np.random.Generator) -> Non
             assert b.error < 1e-6
 
 
+@pytest.mark.parametrize("alpha", [(1e-4, 1e-4), (1e-3, 1e-3), (1e-2, 1e-2), (1e-3, 0.03)])
+@pytest.mark.parametrize("degrees", [0.0, 40.0, 80.0, 89.5])
+def test_boundary_against_area_in_a_highlight(alpha: tuple[float, float], degrees: float) -> None:
+    """Smooth surfaces too: lights so small that a grid over them resolves the highlight."""
+    wo = direction(np.radians(degrees), 0.5)
+    mirror = wo * [-1.0, -1.0, 1.0]
+    u = np.array([np.sin(0.5), -np.cos(0.5), 0.0])
+    v = np.cross(mirror, u)
+    for shift, size in ((0.0, 1.0), (1.5, 2.0), (-2.0, 0.3)):
+        outline = alpha[0] * (size * SQUARE + [shift, 0.5 * shift])
+        light = place(outline, mirror, u, v)
+        a = reference.specular_integral([light], wo, *alpha)
+        b = reference.specular_area_integral([light], wo, *alpha)
+        assert a.one == pytest.approx(b.one, abs=1e-8 + a.error + b.error)
+        assert a.fresnel == pytest.approx(b.fresnel, abs=1e-8 + a.error + b.error)
+        assert b.error < (1e-6 if degrees < 89.0 else 1e-5)  # the highlight's width is alpha cos
+
+
 @pytest.mark.parametrize(("log_alpha", "degrees"), [(-3.0, 89.5), (-4.0, 89.99)])
 def test_boundary_against_sampling(
     log_alpha: float, degrees: float, rng: np.random.Generator
@@ -177,6 +195,28 @@ def test_stars_and_holes(rng: np.random.Generator) -> None:
         if ax > 0.1:
             area = reference.specular_area_integral([outer, hole], wo, ax, ay)
             assert got.one == pytest.approx(area.one, abs=1e-8 + area.error)
+
+
+def test_random_stars_with_holes_equal_their_triangles(rng: np.random.Generator) -> None:
+    """Several crossings of the horizon, of outer loop and hole, from smooth to rough."""
+    t = np.arange(12) * np.pi / 6.0
+    r = np.where(np.arange(12) % 2 == 0, 1.0, 0.5)
+    star = np.stack([r * np.cos(t), r * np.sin(t)], axis=-1)
+    _, wo, ax, ay = configurations(rng, 12, -3.0, 89.0, isotropic=False)
+    crossing = 0
+    for i in range(len(wo)):
+        c = wo[i] * [-1.0, -1.0, 1.0] + 0.3 * rng.normal(size=3)
+        u, v = rng.normal(size=(2, 3))
+        outer, hole = place(star, c, u, v), place(0.4 * star, c, u, v)[::-1]
+        crossing += int(np.min(hole[:, 2]) < 0.0 < np.max(hole[:, 2]))
+        got = reference.specular_integral([outer, hole], wo[i], ax[i], ay[i])
+        corners = np.concatenate([outer, hole])
+        after = np.concatenate([np.roll(outer, -1, axis=0), np.roll(hole, -1, axis=0)])
+        triangles = np.stack([np.broadcast_to(c, corners.shape), corners, after], axis=1)
+        parts = reference.specular_integral_batch(triangles, wo[i], ax[i], ay[i], 12, 1e-9)
+        assert got.one == pytest.approx(np.sum(parts[0]), abs=1e-8)
+        assert got.fresnel == pytest.approx(np.sum(parts[1]), abs=1e-8)
+    assert crossing >= 3
 
 
 def test_tiny_lights_keep_their_relative_accuracy(rng: np.random.Generator) -> None:
