@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import time
+import traceback
 from collections import deque
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -25,11 +26,12 @@ from imgui_bundle.imguizmo import im_guizmo as gizmo
 from app import camera_control as control
 from app import edits, theme
 from app.editor import NOTHING, Editor, Selection
+from app.errors import InputError
 from app.meshes import load_mesh
 from app.render.camera import world_from_object
 from app.render.renderer import Hit, Renderer
 from app.scene import AreaLight, Camera, RenderSettings, Scene, SceneError, Shot, Vec2, Vec3
-from app.vectors import add, length, scale, subtract
+from app.vectors import add, length, mix, scale, subtract
 
 SLOW = 0.045
 """Seconds for a full-size sample from which on moving pictures are smaller."""
@@ -137,6 +139,7 @@ class Viewport:
         self._corner: CornerDrag | None = None
         self._gizmo: GizmoDrag | None = None
         self._gizmo_hovered = False
+        self._unit = 1.0
         self._moved = 0.0
         self._shot: Shot | None = None
         self._wanted: Scene | None = None
@@ -213,6 +216,7 @@ class Viewport:
 
     def _place(self) -> None:
         corner, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
+        self._unit = imgui.get_font_size() / theme.FONT_SIZE
         ratio = imgui.get_io().display_framebuffer_scale
         x, y = math.ceil(corner.x), math.ceil(corner.y)
         width = max(math.floor(corner.x + room.x) - x, 16)
@@ -253,6 +257,8 @@ class Viewport:
             and imgui.is_mouse_released(imgui.MouseButton_.left)
         ):
             self._select(editor, io.mouse_pos.x, io.mouse_pos.y)
+        if hovered and imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
+            self._split_edge(editor, io.mouse_pos.x, io.mouse_pos.y)
         self._hover(editor.scene, hovered and not active)
 
     def _navigate(self, editor: Editor, dx: float, dy: float) -> None:
@@ -281,6 +287,8 @@ class Viewport:
         return hit
 
     def _select(self, editor: Editor, x: float, y: float) -> None:
+        if self._edge_at(editor, x, y) is not None:
+            return
         hit = self._hit(x, y)
         if hit is None:
             editor.selection = NOTHING
@@ -334,9 +342,10 @@ class Viewport:
         """Submit an invisible button around a point and tell whether it was just pressed."""
         if not self.view.contains(*at) and self._corner is None:
             return False
-        imgui.set_cursor_screen_pos(ImVec2(at[0] - HANDLE, at[1] - HANDLE))
+        half = self._unit * HANDLE
+        imgui.set_cursor_screen_pos(ImVec2(at[0] - half, at[1] - half))
         buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
-        imgui.invisible_button(name, ImVec2(2.0 * HANDLE, 2.0 * HANDLE), buttons)
+        imgui.invisible_button(name, ImVec2(2.0 * half, 2.0 * half), buttons)
         if imgui.is_item_hovered() or imgui.is_item_active():
             imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
         return imgui.is_item_activated() and imgui.is_mouse_down(imgui.MouseButton_.left)
@@ -369,6 +378,37 @@ class Viewport:
         if hit is not None:
             moved = edits.move_vertex(light, drag.vertex, edits.coordinates_on(plane, hit))
             editor.update(edits.replace_light(editor.scene, drag.light, moved))
+
+    def _edge_at(self, editor: Editor, x: float, y: float) -> tuple[int, int, float] | None:
+        """Return (contour, edge, how far along) of the selected light's outline at the pointer."""
+        light = editor.selected_light
+        if light is None:
+            return None
+        camera, plane = self.camera_of(editor.scene), light.plane
+        direction = self.view.ray(camera, x, y)
+        hit = control.intersect_plane(camera.eye, direction, plane.origin, edits.normal_of(plane))
+        if hit is None:
+            return None
+        contour, edge, along = edits.nearest_edge(light, edits.coordinates_on(plane, hit))
+        points = light.outline.contours[contour].points
+        point = mix(points[edge], points[(edge + 1) % len(points)], along)
+        at = self.view.project(camera, edits.point_on(plane, point))
+        if at is None or math.dist(at, (x, y)) > self._unit * HANDLE:
+            return None
+        return contour, edge, along
+
+    def _split_edge(self, editor: Editor, x: float, y: float) -> None:
+        """Add a corner where the selected light's outline was double-clicked."""
+        found, light = self._edge_at(editor, x, y), editor.selected_light
+        if found is None or light is None:
+            return
+        contour, edge, along = found
+        index = editor.selection.index
+        wider = edits.add_vertex(light, contour, edge, along)
+        editor.apply(
+            f"Add corner to '{light.name}'", edits.replace_light(editor.scene, index, wider)
+        )
+        editor.selection = Selection.light(index, (contour, edge + 1))
 
     def _corner_menu(self, editor: Editor, index: int, vertex: tuple[int, int]) -> None:
         if imgui.begin_popup_context_item(f"corner {vertex[0]}.{vertex[1]}"):
@@ -448,6 +488,8 @@ class Viewport:
             samples = self._renderer.accumulate(shot, settings.samples)
             seconds = time.perf_counter() - began
         except Exception as failure:
+            if not isinstance(failure, InputError):
+                traceback.print_exc()
             self._failed, self.samples = shot, (0, settings.samples)
             self._reporter.failure(str(failure) or type(failure).__name__)
             return
@@ -462,7 +504,7 @@ class Viewport:
     def _picture(self) -> None:
         view, draw = self.view, imgui.get_window_draw_list()
         low, high = ImVec2(view.x, view.y), ImVec2(view.x + view.width, view.y + view.height)
-        if self._shot is None:
+        if self._shot is None or self._failed is not None:
             draw.add_rect_filled(low, high, theme.u32(theme.grey(0.07)))
             return
         texture = self._renderer.texture
@@ -490,6 +532,8 @@ class Viewport:
                 self._outline(draw, camera, light, theme.ACCENT, 0.55, 1.5)
             elif not light.visible:
                 self._outline(draw, camera, light, theme.grey(0.9), 0.3, 1.0)
+        if chosen.kind == "object":
+            self._box(draw, camera, scene, chosen.index)
         active = editor.selected_light
         if active is not None:
             self._direction(draw, camera, active)
@@ -515,6 +559,19 @@ class Viewport:
                     draw.add_line(*ends, shade, thickness + 2.0)
                     draw.add_line(*ends, ink, thickness)
 
+    def _box(self, draw: imgui.ImDrawList, camera: Camera, scene: Scene, index: int) -> None:
+        """Draw the edges of an object's bounding box."""
+        try:
+            corners = _box_corners(scene, index)
+        except InputError:
+            return
+        for a in range(8):
+            for axis in (1, 2, 4):
+                if not a & axis:
+                    ends = self._segment(camera, corners[a], corners[a | axis])
+                    if ends is not None:
+                        draw.add_line(*ends, theme.u32(theme.ACCENT, 0.45), 1.0)
+
     def _segment(self, camera: Camera, a: Vec3, b: Vec3) -> tuple[ImVec2, ImVec2] | None:
         clipped = control.clip_to_view(camera, a, b)
         if clipped is None:
@@ -539,28 +596,43 @@ class Viewport:
             self._find_hidden(editor.scene, editor.selection.index)
         for _, _, at, long_enough in _edge_middles(self.view, camera, light):
             if long_enough:
-                near = max(abs(at[0] - mouse.x), abs(at[1] - mouse.y)) <= HANDLE
-                radius, alpha = (5.0, 1.0) if near else (2.5, 0.6)
-                draw.add_circle_filled(ImVec2(*at), radius + 1.0, theme.u32(theme.grey(0.0), 0.5))
-                draw.add_circle_filled(ImVec2(*at), radius, theme.u32(theme.grey(0.95), alpha))
-                if near:
-                    plus = theme.u32(theme.grey(0.1))
-                    draw.add_line(ImVec2(at[0] - 3, at[1]), ImVec2(at[0] + 3, at[1]), plus, 1.5)
-                    draw.add_line(ImVec2(at[0], at[1] - 3), ImVec2(at[0], at[1] + 3), plus, 1.5)
+                self._middle(draw, at, _is_near(at, mouse, self._unit))
         for vertex, point in edits.vertices_of(light):
-            corner = self.view.project(camera, edits.point_on(light.plane, point))
-            if corner is None:
-                continue
-            near = max(abs(corner[0] - mouse.x), abs(corner[1] - mouse.y)) <= HANDLE
-            selected = editor.selection.vertex == vertex
-            radius = 6.5 if near or selected else 5.0
-            alpha = 0.4 if vertex in self._hidden and not (near or selected) else 1.0
-            centre = ImVec2(*corner)
-            draw.add_circle_filled(centre, radius + 1.5, theme.u32(theme.grey(0.0), 0.6 * alpha))
-            fill = theme.ACCENT if selected or near else theme.grey(0.97)
-            draw.add_circle_filled(centre, radius, theme.u32(fill, alpha))
-            if selected:
-                draw.add_circle(centre, radius + 3.0, theme.u32(theme.ACCENT), 0, 1.5)
+            at_corner = self.view.project(camera, edits.point_on(light.plane, point))
+            if at_corner is not None:
+                near = _is_near(at_corner, mouse, self._unit)
+                chosen = editor.selection.vertex == vertex
+                dim = vertex in self._hidden and not (near or chosen)
+                self._dot(draw, at_corner, near, chosen, 0.4 if dim else 1.0)
+
+    def _middle(self, draw: imgui.ImDrawList, at: tuple[float, float], near: bool) -> None:
+        """Draw the dot that adds a corner, a plus under the pointer."""
+        radius, alpha = (5.0, 1.0) if near else (2.5, 0.6)
+        radius *= self._unit
+        centre, arm = ImVec2(*at), 3.0 * self._unit
+        draw.add_circle_filled(centre, radius + 1.0, theme.u32(theme.grey(0.0), 0.5))
+        draw.add_circle_filled(centre, radius, theme.u32(theme.grey(0.95), alpha))
+        if near:
+            ink = theme.u32(theme.grey(0.1))
+            draw.add_line(ImVec2(at[0] - arm, at[1]), ImVec2(at[0] + arm, at[1]), ink, 1.5)
+            draw.add_line(ImVec2(at[0], at[1] - arm), ImVec2(at[0], at[1] + arm), ink, 1.5)
+
+    def _dot(
+        self,
+        draw: imgui.ImDrawList,
+        at: tuple[float, float],
+        near: bool,
+        chosen: bool,
+        alpha: float,
+    ) -> None:
+        """Draw a corner: larger under the pointer, ringed when selected."""
+        centre = ImVec2(*at)
+        radius = self._unit * (6.5 if near or chosen else 5.0)
+        fill = theme.ACCENT if chosen or near else theme.grey(0.97)
+        draw.add_circle_filled(centre, radius + 1.5, theme.u32(theme.grey(0.0), 0.6 * alpha))
+        draw.add_circle_filled(centre, radius, theme.u32(fill, alpha))
+        if chosen:
+            draw.add_circle(centre, radius + 3.0, theme.u32(theme.ACCENT), 0, 1.5)
 
     def _find_hidden(self, scene: Scene, index: int) -> None:
         """Find out, a few at a time once nothing moves, which corners are behind something."""
@@ -628,6 +700,11 @@ def _edge_middles(
     return found
 
 
+def _is_near(at: tuple[float, float], mouse: ImVec2, unit: float) -> bool:
+    """Tell whether the pointer is where a handle can be grabbed."""
+    return max(abs(at[0] - mouse.x), abs(at[1] - mouse.y)) <= unit * HANDLE
+
+
 def _columns(matrix: np.ndarray) -> list[float]:
     """Return the 16 numbers of a matrix column by column, as ImGuizmo takes them."""
     return [float(value) for value in matrix.T.reshape(-1)]
@@ -686,11 +763,26 @@ def _spheres(scene: Scene, selection: Selection) -> list[tuple[Vec3, float]]:
 
 
 def _object_sphere(scene: Scene, index: int) -> tuple[Vec3, float]:
-    item = scene.objects[index]
-    low, high = np.asarray(load_mesh(item.mesh).bounds, dtype=np.float64)
-    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1)
-    matrix = world_from_object(item.transform)
-    world = matrix[:3, :3] @ corners + matrix[:3, 3:]
-    centre = (world.max(1) + world.min(1)) / 2.0
+    world = np.array(_box_corners(scene, index))
+    centre = (world.max(0) + world.min(0)) / 2.0
     x, y, z = centre.tolist()
-    return (x, y, z), float(np.linalg.norm(world - centre[:, None], axis=0).max())
+    return (x, y, z), float(np.linalg.norm(world - centre, axis=-1).max())
+
+
+def _box_corners(scene: Scene, index: int) -> list[Vec3]:
+    """Return the world corners of an object's box; bits 1, 2, 4 of the index choose x, y, z.
+
+    Raises
+    ------
+    InputError
+        If the mesh cannot be loaded.
+    """
+    item = scene.objects[index]
+    bounds = np.asarray(load_mesh(item.mesh).bounds, dtype=np.float64)
+    matrix = world_from_object(item.transform)
+    corners: list[Vec3] = []
+    for i in range(8):
+        point = np.array([bounds[i & 1, 0], bounds[i >> 1 & 1, 1], bounds[i >> 2 & 1, 2]])
+        x, y, z = (matrix[:3, :3] @ point + matrix[:3, 3]).tolist()
+        corners.append((x, y, z))
+    return corners

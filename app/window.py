@@ -57,6 +57,12 @@ TITLE = "LTC Viewer"
 SIZE = (1440, 900)
 STILL_SAMPLES = 32
 IDLE_FPS = 10.0
+PASS_NAMES = {
+    "gbuffer": "G-buffer",
+    "lighting": "Lighting",
+    "display": "Display",
+    "cpu": "CPU, submitting",
+}
 EXPORT_SECONDS = 0.05
 """How long one frame may spend on an export before the window is shown again."""
 
@@ -179,7 +185,8 @@ class Window:
         if editor.selection.kind == "light":
             self._light = editor.selection.index
         view = self.viewport.view
-        self.messages.draw(view.x + view.width, view.y + view.height)
+        above_help = 2.4 * imgui.get_font_size() if self.viewport.show_overlays else 0.0
+        self.messages.draw(view.x + view.width, view.y + view.height - above_help)
         self._update_title()
         if not self.viewport.is_idle or self._exporting is not None:
             hello_imgui.request_refresh()
@@ -344,7 +351,10 @@ class Window:
             self._plan_of = shot
             self._plan = _plan_lines(self.renderer.plan(replace(shot, settings=self.settings)))
         report = Report(
-            passes=tuple(self.renderer.timings().items()),
+            passes=tuple(
+                (PASS_NAMES.get(name, name), value)
+                for name, value in self.renderer.timings().items()
+            ),
             history=tuple(viewport.history),
             gpu=str(self.renderer.ctx.info["GL_RENDERER"]),
             size=(shot.width, shot.height),
@@ -429,14 +439,14 @@ class Window:
         typing = imgui.get_io().want_text_input
         pressed = imgui.is_key_chord_pressed
         table: tuple[tuple[int, bool, Callable[[], None]], ...] = (
-            (_CTRL | _SHIFT | _KEY.z, True, self.redo),
-            (_CTRL | _KEY.z, True, self.undo),
-            (_CTRL | _KEY.y, True, self.redo),
+            (_CTRL | _SHIFT | _KEY.z, False, self.redo),
+            (_CTRL | _KEY.z, False, self.undo),
+            (_CTRL | _KEY.y, False, self.redo),
             (_CTRL | _SHIFT | _KEY.s, True, self.ask_save),
             (_CTRL | _KEY.s, True, self.save),
             (_CTRL | _KEY.o, True, self.ask_open),
             (_CTRL | _KEY.n, True, self.new),
-            (_CTRL | _KEY.d, True, lambda: self._apply("Duplicate", duplicate_selected)),
+            (_CTRL | _KEY.d, False, lambda: self._apply("Duplicate", duplicate_selected)),
             (_CTRL | _KEY.e, True, self._open_export),
             (_CTRL | _KEY.q, True, self.quit),
             (_KEY.delete, False, lambda: self._apply("Remove", remove_selected)),
@@ -529,28 +539,32 @@ class Window:
         """Ask for a scene file and open it."""
         self._unless_unsaved(lambda: self._dialogs.ask_open("Open a scene", SCENES, self.open))
 
-    def save(self) -> None:
-        """Save to the scene's file; ask for one if it has none."""
+    def save(self, then: Callable[[], None] | None = None) -> None:
+        """Save to the scene's file, ask for one if it has none; go on with ``then`` if saved."""
         if self.editor.path is None:
-            self.ask_save()
+            self.ask_save(then)
         else:
-            self.save_as(self.editor.path)
+            self.save_as(self.editor.path, then)
 
-    def save_as(self, path: Path) -> None:
-        """Save to a file; a failure becomes a message."""
+    def save_as(self, path: Path, then: Callable[[], None] | None = None) -> None:
+        """Save to a file and go on with ``then``; a failure becomes a message."""
 
         def do() -> None:
             self.editor.commit()
             save_scene(self.editor.scene, path)
             self.editor.mark_saved(path)
             self.messages.note(f"Saved {path.name}")
+            if then is not None:
+                then()
 
         self._guarded(do)
 
-    def ask_save(self) -> None:
-        """Ask where to save."""
+    def ask_save(self, then: Callable[[], None] | None = None) -> None:
+        """Ask where to save, and go on with ``then`` once it is done."""
         proposal = self.editor.path or Path.home() / "scene.json"
-        self._dialogs.ask_save("Save the scene", SCENES, proposal, self.save_as)
+        self._dialogs.ask_save(
+            "Save the scene", SCENES, proposal, lambda path: self.save_as(path, then)
+        )
 
     def _take_dropped(self) -> None:
         """Open dropped scenes, add dropped meshes."""
@@ -618,12 +632,7 @@ class Window:
         action = self._after_question
         if button("Save###save first", width=width):
             imgui.close_current_popup()
-            if self.editor.path is None:
-                self.ask_save()
-            else:
-                self.save()
-                if action is not None and not self.editor.is_modified:
-                    self._guarded(action)
+            self.save(action)
         imgui.same_line()
         if button("Discard###discard", width=width):
             imgui.close_current_popup()
@@ -773,15 +782,14 @@ def _other_needs(a: Shot, b: Shot) -> bool:
 
 def _plan_lines(plan: Plan) -> tuple[PlanLine, ...]:
     lines = [
-        PlanLine("Program", program.name, f"{program.lines} lines of GLSL")
-        for program in plan.programs
+        PlanLine("Programs", program.name, f"{program.lines} lines") for program in plan.programs
     ]
     lines += [
-        PlanLine(kind, resource.name, f"{resource.form}, {resource.bytes / 1024.0:,.0f} KB")
+        PlanLine(kind, resource.name, f"{resource.bytes / 1024.0:,.0f} KB")
         for kind, resources in (
-            ("Attachment", plan.attachments),
-            ("Table", plan.tables),
-            ("Buffer", plan.buffers),
+            ("Attachments", plan.attachments),
+            ("Tables", plan.tables),
+            ("Buffers", plan.buffers),
         )
         for resource in resources
     ]

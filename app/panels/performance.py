@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from imgui_bundle import ImVec2, imgui, implot
+from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from app.panels.widgets import MUTED, heading, hint, tooltip
+from app.panels.widgets import ACCENT, MUTED, heading, hint, tooltip
 
 
 @dataclass(frozen=True, slots=True)
 class PlanLine:
-    """One thing that the renderer does, or does not, for the present scene."""
+    """One thing that the renderer makes for the present scene, or does without and why."""
 
     kind: str
     name: str
-    reason: str
+    detail: str
     used: bool = True
 
 
@@ -60,17 +60,28 @@ def performance_panel(report: Report) -> None:
         imgui.end_table()
     if len(report.history) > 1:
         _history(np.asarray(report.history, dtype=np.float64))
-    if report.plan:
-        heading("For this scene")
-        for line in report.plan:
-            mark = "•" if line.used else "–"
-            imgui.text_colored(MUTED, mark)
-            imgui.same_line()
-            if line.used:
-                imgui.text_wrapped(line.name)
-            else:
-                hint(f"no {line.name}")
-            tooltip(f"{line.kind}: {line.reason}")
+    kind = ""
+    for line in report.plan:
+        if line.kind != kind:
+            kind = line.kind
+            heading(kind)
+        _plan_line(line)
+
+
+def _plan_line(line: PlanLine) -> None:
+    """Draw a name and, as far as there is room, what there is to say about it."""
+    if not line.used:
+        hint(line.name)
+        tooltip(line.detail)
+        return
+    imgui.text(line.name)
+    room = imgui.get_content_region_avail().x
+    wide, taken = imgui.calc_text_size(line.detail).x, imgui.calc_text_size(line.name).x
+    if wide + taken + imgui.get_font_size() < room:
+        imgui.same_line(imgui.get_cursor_pos_x() + room - wide)
+        imgui.text_colored(MUTED, line.detail)
+    else:
+        tooltip(line.detail)
 
 
 def _history(milliseconds: np.ndarray) -> None:
@@ -83,7 +94,8 @@ def _history(milliseconds: np.ndarray) -> None:
             0.0, len(milliseconds) - 1, 0.0, 1.2 * float(milliseconds.max()) + 1e-3,
             implot.Cond_.always,
         )  # fmt: skip
-        implot.plot_shaded("##area", milliseconds)
-        implot.plot_line("##line", milliseconds)
+        area = implot.Spec(fill_color=ImVec4(1.0, 1.0, 1.0, 0.07))
+        implot.plot_shaded("##area", milliseconds, spec=area)
+        implot.plot_line("##line", milliseconds, spec=implot.Spec(line_color=ACCENT))
         implot.end_plot()
     tooltip("Milliseconds per picture, the last ones to the right")

@@ -15,8 +15,8 @@ ROOT = Path(__file__).resolve().parents[2]
 GL = {"moderngl", "moderngl_window", "glcontext", "OpenGL"}
 GUI = {"imgui_bundle", "glfw", "implot", "imguizmo"}
 PURE = {
-    "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.errors", "app.vectors",
-    "app.edits", "app.editor", "app.sliders", "app.camera_control",
+    "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.errors", "app.files",
+    "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
 }  # fmt: skip
 WINDOW = {"app.window", "app.viewport", "app.dialogs", "app.messages", "app.theme"}
 

@@ -161,6 +161,23 @@ def add_and_remove_a_corner(app: Application, out: Path) -> None:
     assert any("3 is the fewest" in message.text for message in app.window.messages.shown)
 
 
+def split_an_edge_by_double_click(app: Application, out: Path) -> None:
+    at = app.on_screen(edits.point_on(SCENE.lights[0].plane, (0.81, 0.3)))
+
+    def action(ctx) -> None:
+        ctx.mouse_move_to_pos(imgui.ImVec2(*at))
+        ctx.yield_(2)
+        ctx.mouse_double_click(0)
+
+    app.act(action)
+    points = app.scene.lights[0].outline.contours[0].points
+    assert len(points) == 5
+    assert np.allclose(points[2], (0.8, 0.3), atol=0.02)
+    app.act(lambda ctx: ctx.item_click("//**/vertex 0.2", 1))
+    app.click("Remove corner")
+    assert app.scene == SCENE
+
+
 def cut_a_hole(app: Application, out: Path) -> None:
     x, y = app.on_screen(edits.centre_of(SCENE.lights[0]))
     view = app.window.viewport.view
@@ -417,6 +434,7 @@ SCENARIOS = (
     escape_cancels_a_drag,
     change_roughness_by_its_slider,
     add_and_remove_a_corner,
+    split_an_edge_by_double_click,
     cut_a_hole,
     add_copy_and_remove_lights,
     select_by_clicking,

@@ -24,6 +24,7 @@ SCENARIOS = (
     "escape_cancels_a_drag",
     "change_roughness_by_its_slider",
     "add_and_remove_a_corner",
+    "split_an_edge_by_double_click",
     "cut_a_hole",
     "add_copy_and_remove_lights",
     "select_by_clicking",
