@@ -76,9 +76,14 @@ class LightNeeds:
 
     @classmethod
     def of(cls, lights: Sequence[AreaLight], limits: Limits) -> LightNeeds:
-        """Raise `InputError` if the lights have more edges than the machine can hold."""
+        """Raise `InputError` if the lights are more, or larger, than the machine can hold."""
+        geometries = [light_geometry(light) for light in lights]
         shining = [light for light in lights if any(light.radiance)]
-        edges = sum(len(light_geometry(light).edges) for light in shining)
+        edges = sum(
+            len(geometry.edges)
+            for light, geometry in zip(lights, geometries, strict=True)
+            if any(light.radiance)
+        )
         texels = TEXELS_PER_LIGHT * len(lights) + TEXELS_PER_EDGE * edges
         if texels > limits.storage_texels:
             raise InputError(

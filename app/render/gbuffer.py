@@ -13,9 +13,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from app.errors import InputError
 from app.meshes import Mesh, load_mesh
 from app.render.camera import CameraFrame, normal_from_object, world_from_object
-from app.render.pack import pack_light_shapes
+from app.render.pack import LARGEST_NUMBER, pack_light_shapes
 from app.render.programs import Programs, ProgramSpec, set_uniform, write_uniform
 from app.render.state import begin_pass
 from app.scene import AreaLight, SceneObject
@@ -111,6 +112,12 @@ class GBufferPass:
         instances = []
         for item in objects:
             matrix = world_from_object(item.transform)
+            largest = float(np.abs(matrix).max())
+            if not largest < LARGEST_NUMBER:
+                raise InputError(
+                    f"object '{item.name}': its transform reaches {largest:g}, "
+                    f"expected numbers below {LARGEST_NUMBER:g}"
+                )
             normal = normal_from_object(matrix)
             mirrors = np.linalg.det(matrix[:3, :3]) < 0.0
             instances.append(_Instance(item.mesh, matrix, normal, -1.0 if mirrors else 1.0))

@@ -17,6 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from app.errors import InputError
 from app.outline import resolve, triangulate
 from app.scene import AreaLight, Material, Plane, Vec2
 
@@ -65,6 +66,9 @@ TEXELS_PER_MATERIAL = MATERIAL_RECORD.itemsize // 16
 TEXELS_PER_EDGE = 2
 MAX_INDEX = 2**24
 """Texel indices are stored as float32."""
+CACHED_LIGHTS = 4096
+LARGEST_NUMBER = 1e12
+"""Lengths [m] and radiance from here on would overflow float32 in products of three."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +106,26 @@ def plane_basis(plane: Plane) -> tuple[FloatArray, FloatArray, FloatArray]:
     return e1, e2, np.array([[length, v @ e1], [0.0, v @ e2]])
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=CACHED_LIGHTS)
 def light_geometry(light: AreaLight) -> LightGeometry:
-    """Return a light's geometry; one whose outline is empty has no edges."""
+    """Return a light's geometry; one whose outline is empty has no edges.
+
+    Raises
+    ------
+    InputError
+        If its lengths or radiance do not fit into float32.
+    """
+    geometry = _light_geometry(light)
+    largest = max(float(np.abs(geometry.origin).max()), geometry.radius, *light.radiance)
+    if not largest < LARGEST_NUMBER:
+        raise InputError(
+            f"light '{light.name}': it reaches {largest:g}, expected lengths in metres and "
+            f"radiance below {LARGEST_NUMBER:g}"
+        )
+    return geometry
+
+
+def _light_geometry(light: AreaLight) -> LightGeometry:
     e1, e2, to_metres = plane_basis(light.plane)
     loops = [loop @ to_metres.T for loop in resolve(light.outline)]
     if not loops:
@@ -137,29 +158,34 @@ def pack_lights(lights: Sequence[AreaLight]) -> NDArray[np.float32]:
 
     A light without radiance keeps its header and gets no edges: nothing to integrate.
     """
-    header = np.zeros(len(lights), dtype=LIGHT_HEADER)
-    edges: list[NDArray[np.float32]] = []
-    first = TEXELS_PER_LIGHT * len(lights)
-    for record, light in zip(header, lights, strict=True):
-        geometry = light_geometry(light)
-        mine = geometry.edges if any(light.radiance) else geometry.edges[:0]
-        for name, vector in (
-            ("origin", geometry.origin),
-            ("u", geometry.u),
-            ("v", geometry.v),
-            ("n", np.cross(geometry.u, geometry.v)),
-        ):
-            record[name], record[f"{name}_low"] = _split(vector)
-        record["first_edge"] = first
-        record["edge_count"] = len(mine)
-        # Rounded up: the shader skips what this circle says is below the surface.
-        record["radius"] = np.float32(geometry.radius) * np.float32(1.0 + 1e-6)
-        record["two_sided"] = light.two_sided
-        record["red"], record["green"], record["blue"] = light.radiance
-        edges.append(np.stack(_split(mine), axis=1).reshape(-1, 4))
-        first += TEXELS_PER_EDGE * len(mine)
+    packed = [_packed_light(light) for light in lights]
+    header = np.concatenate([np.zeros(0, LIGHT_HEADER), *(record for record, _ in packed)])
+    counts = np.array([len(edges) for _, edges in packed], dtype=np.int64)
+    before = np.cumsum(counts) - counts
+    header["first_edge"] = TEXELS_PER_LIGHT * len(lights) + before
     texels = header.view(np.float32).reshape(-1, 4)
-    return np.concatenate([texels, *edges])
+    return np.concatenate([texels, *(edges for _, edges in packed)])
+
+
+@lru_cache(maxsize=CACHED_LIGHTS)
+def _packed_light(light: AreaLight) -> tuple[NDArray[np.void], NDArray[np.float32]]:
+    """Return a header (1,), still without its first edge, and the texels (2 edges, 4)."""
+    geometry = light_geometry(light)
+    edges = geometry.edges if any(light.radiance) else geometry.edges[:0]
+    record = np.zeros(1, dtype=LIGHT_HEADER)
+    for name, vector in (
+        ("origin", geometry.origin),
+        ("u", geometry.u),
+        ("v", geometry.v),
+        ("n", np.cross(geometry.u, geometry.v)),
+    ):
+        record[name], record[f"{name}_low"] = _split(vector)
+    record["edge_count"] = len(edges)
+    # Rounded up: the shader skips what this circle says is below the surface.
+    record["radius"] = np.float32(geometry.radius) * np.float32(1.0 + 1e-6)
+    record["two_sided"] = light.two_sided
+    record["red"], record["green"], record["blue"] = light.radiance
+    return record, np.stack(_split(edges), axis=1).reshape(-1, 4)
 
 
 def _split(values: FloatArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -201,7 +227,7 @@ def pack_light_shapes(lights: Sequence[AreaLight]) -> LightShapes:
     return LightShapes(vertices, sum(len(part) for part in one))
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=CACHED_LIGHTS)
 def _light_triangles(light: AreaLight, index: int) -> NDArray[np.void]:
     points, triangles = triangulate(light.outline)
     e1, e2, to_metres = plane_basis(light.plane)

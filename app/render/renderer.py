@@ -463,7 +463,7 @@ class Renderer:
                 f"expected at most {self.limits.texture_side} pixels a side"
             )
         scene = shot.scene
-        needs = needs_of(scene, samples, self.limits)
+        needs = self._needs_of(scene, samples)
         features = needs.lighting
         self._stale = True
         for spec in needs.programs:
@@ -494,6 +494,18 @@ class Renderer:
         self._newest = ""
         self._displayed = None
         self._cpu_ms = 1e3 * (time.perf_counter() - start)
+
+    def _needs_of(self, scene: Scene, samples: int) -> Needs:
+        """Return `needs_of`, from the last time if nothing that it depends on is new."""
+        if self._needs is not None and self._seen is not None and not self._stale:
+            seen = self._seen.shot.scene
+            same = all(
+                getattr(seen, part) is getattr(scene, part)
+                for part in ("materials", "objects", "lights")
+            )
+            if same and self._needs.lighting.accumulates == (samples > 1):
+                return self._needs
+        return needs_of(scene, samples, self.limits)
 
     def _add_sample(self) -> None:
         assert self._seen is not None

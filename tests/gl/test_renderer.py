@@ -370,6 +370,17 @@ def test_limits_are_sentences(renderer: Renderer) -> None:
         renderer.render(Shot(many_lights(200), RenderSettings(), 1, 1))
 
 
+def test_numbers_that_float32_cannot_hold(renderer: Renderer) -> None:
+    bright = replace(KEY, radiance=(1.0, 1e30, 1.0))
+    far = replace(KEY, plane=Plane((0.0, 1e200, 0.0)))
+    for light in (bright, far):
+        with pytest.raises(InputError, match=r"light 'key': it reaches 1e\+(30|200), expected"):
+            renderer.render(shot(one_light(GLOSSY, light)))
+    huge = replace(floor(), transform=Transform(scale=(1e13, 1.0, 1.0)))
+    with pytest.raises(InputError, match=r"object 'floor': its transform reaches 1e\+13"):
+        renderer.render(shot(replace(one_light(), objects=(huge,))))
+
+
 def test_unknown_techniques_are_refused(renderer: Renderer) -> None:
     with pytest.raises(InputError, match="technique 'lct' is unknown"):
         renderer.render(Shot(one_light(), RenderSettings(technique="lct"), 8, 8))
