@@ -1,0 +1,408 @@
+"""Scene files: the documented example, defaults, and round trips to the bit."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+from dataclasses import replace
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.errors import InputError
+from app.scene import (
+    FILL_RULES,
+    TONE_MAPS,
+    AreaLight,
+    Camera,
+    Display,
+    Material,
+    Outline,
+    Plane,
+    PolygonContour,
+    Scene,
+    SceneError,
+    SceneObject,
+    Transform,
+)
+from app.scene_io import (
+    LARGEST_NUMBER,
+    LINE_LENGTH,
+    demo_scenes,
+    load_scene,
+    save_scene,
+    scene_from_json,
+    scene_to_json,
+)
+
+EXAMPLE = """{
+  "format": "ltc-scene/1",
+  "camera": {"eye": [0, 1.2, 4], "target": [0, 0.8, 0], "up": [0, 1, 0], "fov_y": 45.0},
+  "materials": {
+    "floor": {"diffuse": [0.2, 0.2, 0.2], "f0": [0.04, 0.04, 0.04], "alpha": [0.1, 0.1],
+              "rotation": 0.0}
+  },
+  "objects": [
+    {"name": "floor", "mesh": "plane", "material": "floor",
+     "transform": {"translate": [0, 0, 0], "rotate": [1, 0, 0, 0], "scale": [10, 10, 10]}}
+  ],
+  "lights": [
+    {"name": "key",
+     "plane": {"origin": [0, 1, -2], "u": [1, 0, 0], "v": [0, 1, 0]},
+     "outline": {"fill_rule": "evenodd",
+                 "contours": [{"polygon": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}]},
+     "radiance": [5, 5, 5], "two_sided": false, "visible": true}
+  ],
+  "display": {"exposure": 0.0, "tone_map": "agx"}
+}
+"""
+
+SQUARE = PolygonContour(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
+
+
+def read(text: str) -> Scene:
+    return scene_from_json(text, None, "test")
+
+
+def document(**parts: object) -> str:
+    return json.dumps({"format": "ltc-scene/1", **parts})
+
+
+def test_the_documented_example() -> None:
+    assert read(EXAMPLE) == Scene(
+        materials=(Material("floor", (0.2, 0.2, 0.2), (0.04, 0.04, 0.04), (0.1, 0.1), 0.0),),
+        objects=(SceneObject("floor", "plane", "floor", Transform(scale=(10.0, 10.0, 10.0))),),
+        lights=(
+            AreaLight("key", Outline((SQUARE,)), Plane(origin=(0.0, 1.0, -2.0)), (5.0, 5.0, 5.0)),
+        ),
+        camera=Camera(fov_y=math.radians(45.0)),
+        display=Display(),
+    )
+
+
+def test_everything_but_the_format_has_a_default() -> None:
+    assert read(document()) == Scene()
+    parts = document(
+        camera={}, materials={"m": {}}, objects=[{}, {"transform": {}}],
+        lights=[{}, {"plane": {}, "outline": {}}], display={},
+    )  # fmt: skip
+    scene = read(parts)
+    assert scene.camera == Camera()
+    assert scene.display == Display()
+    assert scene.materials == (Material("m"), Material("default"))
+    assert [item.name for item in scene.objects] == ["object 1", "object 2"]
+    assert [item.material for item in scene.objects] == ["default", "default"]
+    assert [light.name for light in scene.lights] == ["light 1", "light 2"]
+    assert scene.lights[1] == AreaLight("light 2", Outline((SQUARE,)))
+
+
+def test_missing_names_step_aside() -> None:
+    scene = read(document(objects=[{}, {"name": "object 1"}, {"name": "object 3"}, {}]))
+    assert [item.name for item in scene.objects] == ["object 2", "object 1", "object 3", "object 4"]
+
+
+def test_a_material_named_default_is_the_default() -> None:
+    scene = read(document(materials={"default": {"alpha": [0.5, 0.5]}}, objects=[{}]))
+    assert scene.materials == (Material("default", alpha=(0.5, 0.5)),)
+
+
+def test_a_byte_order_mark_is_no_error(tmp_path: Path) -> None:
+    path = tmp_path / "bom.json"
+    path.write_bytes(b"\xef\xbb\xbf" + EXAMPLE.encode())
+    assert load_scene(path) == read(EXAMPLE)
+
+
+# Round trips
+
+names = st.text(
+    st.characters(exclude_categories=("Cs",), exclude_characters="\0"), min_size=1, max_size=12
+).filter(lambda text: bool(text.strip()))
+numbers = st.floats(-LARGEST_NUMBER, LARGEST_NUMBER)
+shares = st.floats(0.0, 1.0)
+alphas = st.floats(1e-4, 1.0)
+
+
+def triples(values: st.SearchStrategy[float]) -> st.SearchStrategy[tuple[float, ...]]:
+    return st.tuples(values, values, values)
+
+
+@st.composite
+def rotations(draw: st.DrawFn) -> tuple[float, ...]:
+    quaternion = draw(st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 0.1))
+    norm = math.hypot(*quaternion)
+    return tuple(x / norm for x in quaternion)
+
+
+def valid(strategy: st.SearchStrategy, **fields: st.SearchStrategy) -> st.SearchStrategy:
+    """Build objects of a dataclass from fields, without those that it refuses."""
+
+    def build(values: dict) -> object | None:
+        try:
+            return strategy(**values)
+        except SceneError:
+            return None
+
+    return st.fixed_dictionaries(fields).map(build).filter(lambda made: made is not None)
+
+
+cameras = valid(
+    Camera,
+    eye=triples(numbers),
+    target=triples(numbers),
+    up=triples(numbers),
+    fov_y=st.floats(math.radians(1.0), math.radians(170.0)),
+)
+transforms = valid(
+    Transform, translate=triples(numbers), rotate=rotations(), scale=triples(numbers)
+)
+outlines = valid(
+    Outline,
+    contours=st.lists(
+        st.lists(st.tuples(numbers, numbers), min_size=3, max_size=40).map(
+            lambda points: PolygonContour(tuple(points))
+        ),
+        min_size=1,
+        max_size=3,
+    ).map(tuple),
+    fill_rule=st.sampled_from(FILL_RULES),
+)
+lights = valid(
+    AreaLight,
+    name=names,
+    outline=outlines,
+    plane=valid(Plane, origin=triples(numbers), u=triples(numbers), v=triples(numbers)),
+    radiance=triples(st.floats(0.0, LARGEST_NUMBER)),
+    two_sided=st.booleans(),
+    visible=st.booleans(),
+)
+materials = valid(
+    Material,
+    name=names,
+    diffuse=triples(shares),
+    f0=triples(shares),
+    alpha=st.tuples(alphas, alphas),
+    rotation=st.floats(-1e6, 1e6),
+)
+
+
+@st.composite
+def scenes(draw: st.DrawFn) -> Scene:
+    used = draw(st.lists(materials, max_size=3, unique_by=lambda m: m.name))
+    objects = []
+    if used:
+        meshes = st.sampled_from(("plane", "sphere", "/meshes/a.obj", "/plane", "/b c/ü.glb"))
+        items = valid(
+            SceneObject,
+            name=names,
+            mesh=meshes,
+            material=st.sampled_from([material.name for material in used]),
+            transform=transforms,
+        )
+        objects = draw(st.lists(items, max_size=3, unique_by=lambda item: item.name))
+    return Scene(
+        tuple(used),
+        tuple(objects),
+        tuple(draw(st.lists(lights, max_size=3, unique_by=lambda light: light.name))),
+        draw(cameras),
+        draw(valid(Display, exposure=st.floats(-32, 32), tone_map=st.sampled_from(TONE_MAPS))),
+    )
+
+
+@settings(max_examples=80)
+@given(scenes())
+def test_text_round_trip_is_exact(scene: Scene) -> None:
+    for base in (None, Path("/meshes/scenes"), Path("/")):
+        text = scene_to_json(scene, base)
+        assert scene_from_json(text, base, "again") == scene
+        assert scene_to_json(scene_from_json(text, base, "again"), base) == text
+
+
+@settings(max_examples=20)
+@given(scenes())
+def test_file_round_trip_is_exact(tmp_path_factory: pytest.TempPathFactory, scene: Scene) -> None:
+    path = tmp_path_factory.mktemp("scenes") / "scene.json"
+    scene = replace(scene, objects=tuple(replace(o, mesh="disc") for o in scene.objects))
+    save_scene(scene, path)
+    assert load_scene(path) == scene
+    assert [item.name for item in path.parent.iterdir()] == ["scene.json"]
+
+
+def test_every_angle_survives() -> None:
+    # About one angle in ten is no multiple of pi/180 by any float64.
+    generator = random.Random(4)
+    for _ in range(3000):
+        angle = generator.uniform(-7.0, 7.0) * 10.0 ** generator.uniform(-12.0, 3.0)
+        scene = Scene(materials=(Material("m", rotation=angle),))
+        assert read(scene_to_json(scene, None)) == scene
+
+
+@pytest.mark.parametrize("degrees", ["45", "30", "0.1", "90", "-12.75", "1e-05", "359.99", "33.3"])
+def test_angles_keep_their_short_text(degrees: str) -> None:
+    scene = read(document(materials={"m": {"rotation": float(degrees)}}))
+    assert scene.materials[0].rotation == math.radians(float(degrees))
+    written = json.loads(scene_to_json(scene, None), parse_float=Decimal, parse_int=Decimal)
+    assert written["materials"]["m"]["rotation"] == Decimal(degrees)
+
+
+def test_demo_scenes_keep_their_values_when_saved(tmp_path: Path) -> None:
+    demos = demo_scenes()
+    assert demos
+    for path in demos.values():
+        scene = load_scene(path)
+        save_scene(scene, tmp_path / path.name)
+        assert load_scene(tmp_path / path.name) == scene
+
+
+def test_written_files_are_readable() -> None:
+    points = tuple((math.cos(i), math.sin(i)) for i in range(200))
+    scene = replace(read(EXAMPLE), lights=(AreaLight("l", Outline((PolygonContour(points),))),))
+    text = scene_to_json(scene, None)
+    assert max(len(line) for line in text.splitlines()) <= LINE_LENGTH
+    assert '  "camera": {"eye": [0, 1.2, 4], "target": [0, 0.8, 0], ' in text
+
+
+# Mesh paths
+
+
+def mesh_scene(mesh: str) -> Scene:
+    return Scene((Material("m"),), (SceneObject("o", mesh, "m"),))
+
+
+def test_mesh_paths_are_relative_to_the_file(tmp_path: Path) -> None:
+    mesh = tmp_path / "meshes" / "a mesh.obj"
+    mesh.parent.mkdir()
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    folder = tmp_path / "scenes" / "deep"
+    folder.mkdir(parents=True)
+    save_scene(mesh_scene(str(mesh)), folder / "s.json")
+    written = json.loads((folder / "s.json").read_text())
+    assert written["objects"][0]["mesh"] == "../../meshes/a mesh.obj"
+    assert load_scene(folder / "s.json").objects[0].mesh == str(mesh)
+    # Both folders move together.
+    moved = tmp_path / "elsewhere"
+    moved.mkdir()
+    (tmp_path / "meshes").rename(moved / "meshes")
+    (tmp_path / "scenes").rename(moved / "scenes")
+    there = load_scene(moved / "scenes" / "deep" / "s.json")
+    assert there.objects[0].mesh == str(moved / "meshes" / "a mesh.obj")
+
+
+def test_a_relative_scene_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    monkeypatch.chdir(tmp_path)
+    save_scene(mesh_scene(str(tmp_path / "m.obj")), "s.json")
+    assert json.loads(Path("s.json").read_text())["objects"][0]["mesh"] == "m.obj"
+    assert load_scene("s.json").objects[0].mesh == str(tmp_path / "m.obj")
+
+
+def test_a_file_named_like_a_built_in() -> None:
+    text = scene_to_json(mesh_scene("/folder/plane"), Path("/folder"))
+    assert json.loads(text)["objects"][0]["mesh"] == "./plane"
+    assert scene_from_json(text, Path("/folder"), "x").objects[0].mesh == "/folder/plane"
+
+
+def test_a_linked_folder(tmp_path: Path) -> None:
+    real = tmp_path / "real" / "scenes"
+    real.mkdir(parents=True)
+    (tmp_path / "link").symlink_to(real)
+    (tmp_path / "real" / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    save_scene(mesh_scene(str(tmp_path / "real" / "m.obj")), tmp_path / "link" / "s.json")
+    for folder in (tmp_path / "link", real):
+        assert load_scene(folder / "s.json").objects[0].mesh == str(tmp_path / "real" / "m.obj")
+
+
+# Saving
+
+
+def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "s.json"
+    save_scene(Scene(), path)
+    before = path.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError, match="no space left on device"):
+        save_scene(read(EXAMPLE), path)
+    assert path.read_bytes() == before
+    assert [item.name for item in tmp_path.iterdir()] == ["s.json"]
+
+
+def test_saving_keeps_permissions(tmp_path: Path) -> None:
+    path = tmp_path / "s.json"
+    save_scene(Scene(), path)
+    path.chmod(0o640)
+    save_scene(read(EXAMPLE), path)
+    assert path.stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize(
+    ("scene", "said"),
+    [
+        (Scene(materials=(Material("\ud800"),)), "half a character"),
+        (Scene(materials=(Material(" "),)), "expected a name"),
+        (Scene(camera=Camera(eye=(1e300, 0.0, 0.0))), "between -1e+15 and 1e+15"),
+    ],
+)
+def test_what_would_not_open_is_not_saved(tmp_path: Path, scene: Scene, said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        save_scene(scene, tmp_path / "s.json")
+    assert said in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_save_errors_name_the_place(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="this is a folder"):
+        save_scene(Scene(), tmp_path)
+    with pytest.raises(InputError, match="does not exist"):
+        save_scene(Scene(), tmp_path / "nowhere" / "s.json")
+
+
+def test_a_million_characters() -> None:
+    generator = random.Random(1)
+    points = [[generator.random(), generator.random()] for _ in range(30_000)]
+    text = document(lights=[{"outline": {"contours": [{"polygon": points}]}}])
+    assert len(text) > 1_000_000
+    scene = read(text)
+    assert len(scene.lights[0].outline.contours[0].points) == 30_000
+    assert read(scene_to_json(scene, None)) == scene
+
+
+@settings(max_examples=150)
+@given(st.text(max_size=60) | st.binary(max_size=60).map(lambda b: b.decode("latin-1")))
+def test_any_text_is_a_scene_or_one_sentence(text: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read(text)
+    assert "\n" not in str(caught.value)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner),
+    max_leaves=8,
+)
+
+
+@settings(max_examples=250)
+@given(st.data())
+def test_any_value_anywhere_is_a_scene_or_one_sentence(data: st.DataObject) -> None:
+    tree = json.loads(EXAMPLE)
+    node, key = tree, data.draw(st.sampled_from(sorted(set(tree))))
+    while data.draw(st.booleans()) and isinstance(node[key], dict | list) and node[key]:
+        node = node[key]
+        choices = sorted(node) if isinstance(node, dict) else list(range(len(node)))
+        key = data.draw(st.sampled_from(choices))
+    node[key] = data.draw(json_values)
+    try:
+        scene = read(json.dumps(tree))
+    except InputError as error:
+        assert str(error).startswith("test: ")
+        assert "\n" not in str(error)
+    else:
+        assert read(scene_to_json(scene, None)) == scene
