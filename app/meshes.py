@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import InputError, expected_one_of, require_file
+from app.errors import InputError, expected_one_of, os_reason, require_file
 from app.scene import BUILT_IN_MESHES
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def load_mesh(name_or_path: str) -> Mesh:
         state = path.stat()
         return _from_file(path, state.st_mtime_ns, state.st_size)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}), expected a mesh") from error
+        raise InputError(f"{path}: cannot be read ({os_reason(error)}), expected a mesh") from error
 
 
 def check_mesh_path(path: Path) -> None:
@@ -288,8 +288,15 @@ def _read(path: Path) -> trimesh.Scene:
                 **options,
             )
     except OSError as error:
-        reason = error.strerror or "a file it refers to is missing"
-        raise InputError(f"{path}: cannot be read ({reason.lower()}), expected a mesh") from error
+        # The resolver's own errors hold nothing but the name of the file that it looked for.
+        missing = str(error.args[0]) if error.errno is None and error.args else ""
+        if missing == "model.gltf":  # what trimesh seeks in an archive, if a .gltf is no JSON
+            reason, expected = "damaged or cut off", "a complete glTF mesh"
+        elif missing:
+            reason, expected = f"it refers to the missing file '{missing}'", "a complete mesh"
+        else:
+            reason, expected = f"cannot be read ({os_reason(error)})", "a mesh"
+        raise InputError(f"{path}: {reason}, expected {expected}") from error
     except Exception as error:  # damaged files fail in as many ways as there are parsers
         if isinstance(error, ImportError):
             reason = "it is not text in UTF-8"  # trimesh looks for a module that guesses encodings

@@ -24,8 +24,8 @@ from app.cli.common import (
     messages,
     named_scene,
     results,
+    whole_number,
 )
-from app.errors import InputError
 from app.files import check_output, replace_file
 from app.render.techniques import check_technique
 from app.scene import RenderSettings, Scene, Shot
@@ -74,10 +74,22 @@ def bench(
     techniques: TechniquesOption = ["ltc"],  # noqa: B006 (typer copies it)
     size: SizeOption = "1920x1080",
     repeats: Annotated[
-        int, typer.Option("--repeats", metavar="N", help="Measured frames per row.")
+        int,
+        typer.Option(
+            "--repeats",
+            metavar="N",
+            help="Measured frames per row.",
+            parser=whole_number("--repeats", 1, MAX_REPEATS),
+        ),
     ] = 30,
     warm_up: Annotated[
-        int, typer.Option("--warm-up", metavar="N", help="Frames before measuring.")
+        int,
+        typer.Option(
+            "--warm-up",
+            metavar="N",
+            help="Frames before measuring.",
+            parser=whole_number("--warm-up", 0, MAX_REPEATS),
+        ),
     ] = 5,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON too.")
@@ -95,9 +107,6 @@ def bench(
       ltc-viewer bench quad.json star.json --technique ltc --size 1920x1080 --json times.json
     """
     width, height = image_size(size)
-    for value, name, least in ((repeats, "--repeats", 1), (warm_up, "--warm-up", 0)):
-        if not least <= value <= MAX_REPEATS:
-            raise InputError(f"{name} is {value}, expected a number from {least} to {MAX_REPEATS}")
     for technique in techniques:
         check_technique(technique)
     if json_file is not None:

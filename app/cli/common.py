@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -24,7 +24,7 @@ from rich.progress import (
 from app.errors import InputError, nearest
 from app.meshes import load_mesh
 from app.render.techniques import TECHNIQUES
-from app.scene import MAX_IMAGE_SIDE, Scene
+from app.scene import MAX_IMAGE_SIDE, MAX_SAMPLES, Scene
 from app.scene_io import demo_scenes, load_scene
 
 if TYPE_CHECKING:
@@ -55,6 +55,22 @@ def results() -> Console:
     return console
 
 
+def whole_number(option: str, least: int, most: int) -> Callable[[str | int], int]:
+    """Return a reader of an option's whole number that names the option in its errors."""
+
+    def read(value: str | int) -> int:
+        expected = f"expected a whole number from {least} to {most}"
+        try:
+            number = int(value)
+        except ValueError:
+            raise InputError(f"{option} is '{value}', {expected}") from None
+        if not least <= number <= most:
+            raise InputError(f"{option} is {number}, {expected}")
+        return number
+
+    return read
+
+
 def _list_techniques(value: list[str] | str | None) -> list[str] | str | None:
     names = [value] if isinstance(value, str) else value or []
     if "help" in names:
@@ -70,6 +86,15 @@ SceneArgument = Annotated[
 ]
 SizeOption = Annotated[
     str, typer.Option("--size", metavar="WxH", help="Width and height in pixels.")
+]
+SamplesOption = Annotated[
+    int,
+    typer.Option(
+        "--samples",
+        metavar="N",
+        help="Samples per pixel; 1 is exactly the pixel centre.",
+        parser=whole_number("--samples", 1, MAX_SAMPLES),
+    ),
 ]
 TechniqueOption = Annotated[
     str,

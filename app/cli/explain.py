@@ -11,6 +11,7 @@ import typer
 from app.cli.common import (
     DEFAULT_SIZE,
     FailureError,
+    SamplesOption,
     SceneArgument,
     SizeOption,
     TechniqueOption,
@@ -19,9 +20,8 @@ from app.cli.common import (
     messages,
     named_scene,
 )
-from app.errors import InputError
 from app.render.techniques import check_technique
-from app.scene import MAX_SAMPLES, RenderSettings, Shot
+from app.scene import RenderSettings, Shot
 
 if TYPE_CHECKING:
     from app.render.plan import Plan
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def explain(
     scene: SceneArgument,
     size: SizeOption = DEFAULT_SIZE,
-    samples: Annotated[int, typer.Option("--samples", metavar="N", help="Samples per pixel.")] = 16,
+    samples: SamplesOption = 16,
     technique: TechniqueOption = "ltc",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
@@ -41,8 +41,6 @@ def explain(
       ltc-viewer explain scene.json --size 1920x1080
     """
     width, height = image_size(size)
-    if not 1 <= samples <= MAX_SAMPLES:
-        raise InputError(f"--samples is {samples}, expected a number from 1 to {MAX_SAMPLES}")
     check_technique(technique)
     settings = RenderSettings(technique=technique, samples=samples)
     plan = _plan(Shot(named_scene(scene), settings, width, height))

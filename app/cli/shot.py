@@ -9,6 +9,7 @@ import typer
 
 from app.cli.common import (
     DEFAULT_SIZE,
+    SamplesOption,
     SceneArgument,
     SizeOption,
     Steps,
@@ -17,10 +18,9 @@ from app.cli.common import (
     image_size,
     named_scene,
 )
-from app.errors import InputError
 from app.images import check_image_path, save_image
 from app.render.techniques import check_technique
-from app.scene import MAX_SAMPLES, RenderSettings, Shot
+from app.scene import RenderSettings, Shot
 
 
 def shot(
@@ -30,12 +30,7 @@ def shot(
         typer.Option("--output", "-o", metavar="FILE", help="Picture to write: .png or .exr."),
     ],
     size: SizeOption = DEFAULT_SIZE,
-    samples: Annotated[
-        int,
-        typer.Option(
-            "--samples", metavar="N", help="Samples per pixel; 1 is exactly the pixel centre."
-        ),
-    ] = 16,
+    samples: SamplesOption = 16,
     technique: TechniqueOption = "ltc",
 ) -> None:
     """Render a scene to a picture, without a window.
@@ -48,8 +43,6 @@ def shot(
       ltc-viewer shot scene.json -o picture.png --size 1920x1080 --samples 64
     """
     width, height = image_size(size)
-    if not 1 <= samples <= MAX_SAMPLES:
-        raise InputError(f"--samples is {samples}, expected a number from 1 to {MAX_SAMPLES}")
     check_technique(technique)
     check_image_path(output)
     settings = RenderSettings(technique=technique, samples=samples)
