@@ -40,7 +40,7 @@ SETTLE = 0.2
 
 SMALLEST = 4
 """Most that width and height of a moving picture are divided by."""
-LEAST_ASPECT = 1.5
+LEAST_ASPECT = 16.0 / 9.0
 WIDEST = math.radians(150.0)
 UNDER_STATUS_BAR = 1
 """Points by which hello_imgui's status bar covers the docked windows."""

@@ -46,7 +46,7 @@ from app.panels.material import material_panel, object_panel
 from app.panels.performance import PlanLine, Report, performance_panel
 from app.panels.scene_tree import scene_panel
 from app.panels.status import help_line, status_bar
-from app.panels.widgets import button, heading, hint, name_field
+from app.panels.widgets import button, hint, name_field
 from app.render.plan import Plan
 from app.render.renderer import Renderer
 from app.render.techniques import TECHNIQUES
@@ -146,6 +146,7 @@ class Window:
                 "Scene": self._scene_window,
                 "Light": self._light_window,
                 "Material": self._material_window,
+                "Object": self._object_window,
                 "Display": self._display_window,
                 "Camera": self._camera_window,
                 "Performance": self._performance_window,
@@ -313,20 +314,28 @@ class Window:
         users = [other.name for other in scene.objects if other.material == material.name]
         if item is None:
             hint(f"Used by {', '.join(users) or 'nothing'}. Click an object to see its material.")
-        else:
-            index = self.editor.selection.index
-            heading("Object")
-            typed = name_field("Object", item.name, "The object's name")
-            moved = object_panel(item, [m.name for m in scene.materials])
-            if len(users) > 1 and button(
-                "Make a material of its own", f"Now shared with {len(users) - 1} other objects"
-            ):
-                changed = edits.own_material(scene, index)
-            elif moved != item:
-                changed = edits.replace_object(changed, index, moved)
-            elif typed != item.name:
-                changed = edits.rename_object(changed, index, typed)
+        elif len(users) > 1:
+            hint(f"Shared by {', '.join(users)}.")
+            if button("Make a copy of its own", f"So that only '{item.name}' changes"):
+                changed = edits.own_material(scene, self.editor.selection.index)
         self._stage(changed)
+
+    def _object_window(self) -> None:
+        item = self.editor.selected_object
+        if item is None:
+            hint("Click an object to place it.")
+            return
+        scene, index = self.editor.scene, self.editor.selection.index
+
+        def edit() -> None:
+            typed = name_field("Name", item.name, "What the object is called")
+            new = object_panel(item, [material.name for material in scene.materials])
+            if new != item:
+                self._stage(edits.replace_object(scene, index, new))
+            else:
+                self._stage(edits.rename_object(scene, index, typed))
+
+        self._guarded(edit)
 
     def _display_window(self) -> None:
         editor = self.editor
@@ -516,8 +525,8 @@ class Window:
         """Select the first light in the middle of the picture, so that its corners show."""
         scene = self.editor.scene
         for index, light in enumerate(scene.lights):
-            at = project(scene.camera, edits.centre_of(light), 1.5, 1.0)
-            if at is not None and 0.1 < at[0] < 1.4 and 0.1 < at[1] < 0.9:
+            at = project(scene.camera, edits.centre_of(light), 16.0, 9.0)
+            if at is not None and 1.0 < at[0] < 15.0 and 1.0 < at[1] < 8.0:
                 self.editor.selection = Selection.light(index)
                 return
 
@@ -760,6 +769,7 @@ def _layout(windows: dict[str, Callable[[], None]]) -> hello_imgui.DockingParams
         "Performance": "LeftLow",
         "Light": "Right",
         "Material": "RightLow",
+        "Object": "RightLow",
     }
     docking.dockable_windows = [
         hello_imgui.DockableWindow(name, spaces[name], function, can_be_closed_=False)

@@ -40,7 +40,7 @@ from app.scene_io import load_scene
 from tests.gui.application import Application
 
 CTRL, SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
-SAMPLES = 4
+SAMPLES = 2
 
 SCENE = Scene(
     materials=(
