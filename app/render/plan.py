@@ -89,6 +89,11 @@ class PlannedResource:
     form: str
     bytes: int
 
+    @property
+    def label(self) -> str:
+        """The name without the folders of a mesh file."""
+        return f"mesh {Path(self.name[5:]).name}" if self.name.startswith("mesh ") else self.name
+
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -144,7 +149,7 @@ class Plan:
         ):
             lines += ["", heading]
             lines += [
-                f"  {part.name:<14} {format_bytes(part.bytes):>10}  {part.form}"
+                f"  {part.label:<20} {format_bytes(part.bytes):>10}  {part.form}"
                 for part in resources
             ] or ["  none"]
         lines += ["", f"Allocated: {format_bytes(self.bytes)}", "", "Left out"]

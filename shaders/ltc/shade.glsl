@@ -95,6 +95,18 @@ SurfacePoint surface_point(vec3 position, vec3 normal, vec3 wo, vec2 alpha)
     return point;
 }
 
+// Whether a point at this depth sees a light's dark side, or only its edge.
+bool shows_nothing(PlanarLight light, float depth)
+{
+#if !HAS_TWO_SIDED
+    return depth >= 0.0;
+#elif !HAS_ONE_SIDED
+    return depth == 0.0;
+#else
+    return depth == 0.0 || (depth > 0.0 && !light.two_sided);
+#endif
+}
+
 // Specular and diffuse form factors of a light at a point; both zero where it
 // shows its dark side.
 vec2 light_form_factors(PlanarLight light, SurfacePoint point, CosineTransform specular)
@@ -102,7 +114,7 @@ vec2 light_form_factors(PlanarLight light, SurfacePoint point, CosineTransform s
     mat3 world_from_shading = point.frame.world_from_shading;
     vec3 normal = world_from_shading[2];
     PlaneView view = plane_view(light, point.position);
-    if (view.depth == 0.0 || (view.depth > 0.0 && !light.two_sided)) {
+    if (shows_nothing(light, view.depth)) {
         return vec2(0.0);
     }
     // Certainly below the surface: its disc's highest point is.

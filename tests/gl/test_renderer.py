@@ -547,6 +547,20 @@ def test_timings(renderer: Renderer) -> None:
     assert "lighting" not in renderer.timings()
 
 
+def test_timer_queries_that_return_nothing(renderer: Renderer) -> None:
+    """Some software drivers answer 0; the wall clock steps in and says so."""
+    renderer.render(shot(one_light(), 3))
+    renderer.display()
+
+    class Silent:
+        elapsed = 0
+
+    renderer._timers._queries = dict.fromkeys(renderer._timers._queries, cast(Any, Silent()))
+    figures = renderer.timings()
+    assert renderer.timing_source == "wall clock"
+    assert all(figures[name] > 0.0 for name in ("gbuffer", "lighting", "display"))
+
+
 def test_nothing_rendered_yet(renderer: Renderer) -> None:
     for ask in (renderer.radiance, renderer.display, lambda: renderer.texture):
         with pytest.raises(RuntimeError, match="nothing was rendered yet"):

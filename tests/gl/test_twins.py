@@ -18,7 +18,13 @@ from ltc.polygon import clipped_form_factor
 from ltc.resources import resource_path
 from tests.gl.evaluate import evaluate
 
-FEATURES = {"HAS_SPECULAR": 1, "HAS_DIFFUSE": 1, "HAS_EXACT_FMA": 0}
+FEATURES = {
+    "HAS_SPECULAR": 1,
+    "HAS_DIFFUSE": 1,
+    "HAS_ONE_SIDED": 1,
+    "HAS_TWO_SIDED": 1,
+    "HAS_EXACT_FMA": 0,
+}
 NO_LIGHTS = "vec4 light_texel(int index) { return vec4(0.0); }"
 COUNT = 4096
 
@@ -46,6 +52,7 @@ GPU_ONLY = {
     "form_factor": THROUGH_PROBE,
     "light_form_factor": THROUGH_PROBE,
     "light_form_factors": THROUGH_PROBE,
+    "shows_nothing": THROUGH_PROBE,
     "surface_point": THROUGH_PROBE,
     "specular_lobe": THROUGH_PROBE,
     "probe_lights": THROUGH_PROBE,
