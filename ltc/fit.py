@@ -61,10 +61,11 @@ _EPSILON = 1e-3  # below this error the loss is quadratic, above it absolute
 _TAIL = 50.0  # weight of the squared error beside the absolute one
 _VARIATION = 0.03  # weight of the total variation
 _RELATIVE_FLOOR = 0.05  # relative errors of the density below this count as squares
-_SMOOTHNESS = 1e-6  # weight of squared second differences of the residual
+_SMOOTHNESS = 1e-5  # weight of squared second differences of the residual
 _LOBES, _DIRECTIONS = 2000, 64  # views, and directions each, in the total variation
 _FACTOR_MARGIN = 0.15  # factors of det(I + X) smaller than this are penalised, by squares
-_DAMPING, _DAMPING_MIN, _DAMPING_MAX = 1e-4, 1e-7, 1e6
+_DAMPING, _DAMPING_MIN, _DAMPING_MAX = 1e-2, 1e-6, 1e6
+_DAMPING_FLOOR = 0.1  # damping of unknowns that little depends on, in mean curvatures
 _STEPS, _STEP_GAIN = 40, 1e-4  # most steps; stop when a step gains less than this share
 
 _TRAIN, _TEST, _OCTAGONS, _VARIATION_STREAM = range(4)  # independent streams of one seed
@@ -478,7 +479,7 @@ def fit_steps(state: FitState, shading: ShadingError, lobes: LobeVariation) -> I
     loss, H, g = equations(z)
     damping, steps = state.damping, state.steps
     while not state.done:
-        diagonal = np.diag(H) + 1e-12
+        diagonal = np.diag(H) + _DAMPING_FLOOR * np.mean(np.diag(H))
         while True:
             trial = z - cho_solve(cho_factor(H + np.diag(damping * diagonal)), g)
             new_loss, new_H, new_g = equations(trial)

@@ -203,11 +203,11 @@ class TestFitting:
             fit_isotropic(output, **SETTINGS, resume=True)
         with pytest.raises(KeyboardInterrupt):
             fit_isotropic(output, **SETTINGS, report=_interrupt("fit: step", 1))
-        with pytest.raises(CheckpointError, match="seed 3.*expected.*seed 4.*--fresh"):
+        with pytest.raises(CheckpointError, match=r"seed 3.*expected.*seed 4.*--fresh"):
             fit_isotropic(output, **(SETTINGS | {"seed": 4}))
         checkpoint = fit.checkpoint_path(output)
         checkpoint.write_bytes(checkpoint.read_bytes()[:100])
-        with pytest.raises(CheckpointError, match="damaged.*--fresh"):
+        with pytest.raises(CheckpointError, match=r"damaged.*--fresh"):
             fit_isotropic(output, **SETTINGS)
         fit_isotropic(output, **SETTINGS, resume=False)
         assert not checkpoint.exists()
