@@ -123,9 +123,13 @@ def window(
             "or through 'ssh -X', or render without a window with "
             f"'{PROGRAM} shot {scene or 'SCENE'} -o picture.png'"
         )
-    from app.window import run as run_window
+    try:
+        from app.window import run as run_window
+    except ImportError as error:  # a system library that the GUI is linked with
+        from app.context import explain_failure
 
-    run_window(path)
+        raise FailureError(explain_failure(str(error))) from error
+    raise typer.Exit(run_window(path))
 
 
 app.command()(shot)
