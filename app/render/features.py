@@ -181,6 +181,7 @@ class LightingFeatures:
             "HAS_DIFFUSE": int(self.diffuse),
             "HAS_SHAPES": int(self.shapes),
             "ACCUMULATES": int(self.accumulates),
+            "PROBES": 0,
             "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
             "MATERIAL_TEXELS": self.uniform_materials,
             **lights.defines(),
@@ -189,7 +190,7 @@ class LightingFeatures:
 
 def probe_defines(lights: LightNeeds) -> dict[str, int]:
     """Return the numbers that the probe's shaders are assembled with: a white, glossy material."""
-    return {"HAS_SPECULAR": 1, "HAS_DIFFUSE": 1, **lights.defines()}
+    return {"HAS_SPECULAR": 1, "HAS_DIFFUSE": 1, "PROBES": 1, **lights.defines()}
 
 
 def used_materials(scene: Scene) -> tuple[Material, ...]:

@@ -24,6 +24,7 @@ FEATURES = {
     "HAS_ONE_SIDED": 1,
     "HAS_TWO_SIDED": 1,
     "HAS_EXACT_FMA": 0,
+    "PROBES": 1,
 }
 NO_LIGHTS = "vec4 light_texel(int index) { return vec4(0.0); }"
 COUNT = 4096
@@ -135,7 +136,7 @@ def test_isotropic_lobe(ctx, tmp_path):
     def run(result):
         return evaluate(
             ctx, tmp_path, ["ltc/table.glsl", "ltc/lobe.glsl"], f"{LOBE} result = {result};",
-            inputs, FEATURES, {"residual": residual},
+            inputs, FEATURES, {"residual": residual}, NO_LIGHTS,
         )  # fmt: skip
 
     rows = run("vec4(lobe.row0, lobe.row2)")
