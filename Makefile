@@ -1,6 +1,8 @@
 # Everything happens in .venv, which the first target you run creates.
 
-PYTHON ?= python3
+# The first of these that is new enough; or say which: make PYTHON=/path/to/python3
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 STAMP := .venv/installed
 PYTEST := $(BIN)/python -m pytest -m "not slow" -q -n 2 --dist loadfile
@@ -14,6 +16,8 @@ help:
 	@echo "make clean   delete .venv, renders and caches"
 
 $(STAMP): pyproject.toml .ci/setup.py
+	@test -n "$(PYTHON)" || { echo "ltc-viewer needs Python 3.11 or newer, and there is none on" \
+	    "PATH; install one, or name it with: make PYTHON=/path/to/python3" >&2; exit 1; }
 	@$(PYTHON) .ci/setup.py
 	@touch $@
 

@@ -20,7 +20,6 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 VENV_PYTHON = VENV / "bin" / "python"
 OLDEST = (3, 11)
-NEWER_NAMES = ("python3.14", "python3.13", "python3.12", "python3.11")
 
 DEBIAN_GL = ["libegl1", "libgl1", "libgl1-mesa-dri", "libx11-6", "libxext6"]
 GL_LINES = {
@@ -68,18 +67,14 @@ def apt_install(packages: list[str]) -> bool:
     return quiet.returncode == 0 or (run(["apt-get", "update", "-qq"]) and run(install))
 
 
-def use_new_enough_python() -> None:
-    """Go on under a newer Python if this one is too old and one is on PATH."""
-    if sys.version_info >= OLDEST:
-        return
-    for name in NEWER_NAMES:
-        path = shutil.which(name)
-        if path and run([path, "-c", ""]):
-            os.execv(path, [path, str(Path(__file__).resolve())])
-    fail(
-        "this is Python {}.{}, but ltc-viewer needs Python 3.11 or newer; install one, or name it "
-        "with `make PYTHON=/path/to/python3`.".format(*sys.version_info[:2])
-    )
+def check_python() -> None:
+    """The Makefile looks for a new enough Python; this is for those who name one."""
+    if sys.version_info < OLDEST:
+        fail(
+            "this is Python {}.{}, but ltc-viewer needs Python 3.11 or newer.".format(
+                *sys.version_info[:2]
+            )
+        )
 
 
 def requirements() -> list[str]:
@@ -139,7 +134,7 @@ def ensure_gl() -> None:
 
 
 def main() -> None:
-    use_new_enough_python()
+    check_python()
     say("installing ltc-viewer and its tools into .venv (a minute or two the first time)")
     if not install_with_uv() and not install_with_pip():
         fail("the installation above failed; correct what it complains about and run make again.")
