@@ -15,12 +15,14 @@ import glfw
 # isort: on
 
 import contextlib
+import re
 import sys
 import time
 import traceback
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -390,9 +392,8 @@ class Window:
                 self.ask_open()
             if imgui.begin_menu("Open demo"):
                 for name, path in demo_scenes().items():
-                    if imgui.menu_item_simple(name.replace("-", " ").replace("_", " ").capitalize()
-                                              + f"###{name}"):  # fmt: skip
-                        self._unless_unsaved(lambda path=path: self.open(path))  # type: ignore[misc]
+                    if imgui.menu_item_simple(f"{spoken(name)}###{name}"):
+                        self._unless_unsaved(partial(self.open, path))
                 imgui.end_menu()
             imgui.separator()
             if imgui.menu_item_simple("Save", "Ctrl+S"):
@@ -546,7 +547,10 @@ class Window:
 
     def ask_open(self) -> None:
         """Ask for a scene file and open it."""
-        self._unless_unsaved(lambda: self._dialogs.ask_open("Open a scene", SCENES, self.open))
+        folder = self.editor.path.parent if self.editor.path else Path.home()
+        self._unless_unsaved(
+            lambda: self._dialogs.ask_open("Open a scene", SCENES, folder, self.open)
+        )
 
     def save(self, then: Callable[[], None] | None = None) -> None:
         """Save to the scene's file, ask for one if it has none; go on with ``then`` if saved."""
@@ -581,7 +585,7 @@ class Window:
         for name in dropped:
             path = Path(name)
             if path.suffix.lower() == ".json":
-                self._unless_unsaved(lambda path=path: self.open(path))  # type: ignore[misc]
+                self._unless_unsaved(partial(self.open, path))
             elif path.suffix.lower().lstrip(".") in MESHES[1]:
                 self.add_mesh(path)
             else:
@@ -805,6 +809,11 @@ def _plan_lines(plan: Plan) -> tuple[PlanLine, ...]:
     ]
     lines += [PlanLine("Left out", left.what, left.why, used=False) for left in plan.left_out]
     return tuple(lines)
+
+
+def spoken(name: str) -> str:
+    """Return a file's stem as a title: "01-still-life" becomes "Still life"."""
+    return re.sub(r"^\d+[-_]", "", name).replace("-", " ").replace("_", " ").capitalize()
 
 
 def new_scene() -> Scene:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui, immapp
 
-from app import edits
+from app import dialogs, edits
 from app.scene import Scene, Vec3
 from app.window import Window
 
@@ -35,6 +35,7 @@ class Application:
         if not glfw.init():
             raise RuntimeError("GLFW has no null platform")
         glfw.window_hint(glfw.CONTEXT_CREATION_API, glfw.EGL_CONTEXT_API)
+        dialogs.has_system_dialog = lambda: False
         self.window = Window(scene)
         params = self.window.params
         params.ini_disable = True

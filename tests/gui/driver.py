@@ -301,6 +301,32 @@ def save_reload_compare(app: Application, out: Path) -> None:
     assert np.array_equal(app.picture(), picture)
 
 
+def save_and_open_by_the_dialog(app: Application, out: Path) -> None:
+    folder = out / "scenes"
+    folder.mkdir()
+    (folder / "notes.txt").write_text("not a scene")
+    app.click("Add hole")
+    edited = app.scene
+    app.key(CTRL | imgui.Key.s)
+    field = "//Save the scene/##name"
+    app.act(lambda ctx: ctx.item_input_value(field, str(folder / "mine")))
+    app.frame()
+    assert load_scene(folder / "mine.json") == edited
+    assert not app.window.editor.is_modified
+    app.window.show(SCENE, folder / "other.json")
+    app.key(CTRL | imgui.Key.o)
+    files = app.window._dialogs._inside._files
+    assert [file.name for file in files] == ["mine.json"]
+    app.click("mine.json")
+    app.click("###accept file")
+    app.frame()
+    assert app.scene == edited
+    app.key(CTRL | imgui.Key.o)
+    app.key(imgui.Key.escape)
+    assert not app.window._dialogs.is_open
+    assert app.scene == edited
+
+
 def same_picture_as_headless(app: Application, out: Path) -> None:
     picture = app.picture()
     shot = app.window.viewport.shot
@@ -441,6 +467,7 @@ SCENARIOS = (
     look_around,
     move_and_turn_with_the_gizmo,
     save_reload_compare,
+    save_and_open_by_the_dialog,
     same_picture_as_headless,
     idle_when_nothing_changes,
     export_pictures,

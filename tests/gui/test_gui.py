@@ -31,6 +31,7 @@ SCENARIOS = (
     "look_around",
     "move_and_turn_with_the_gizmo",
     "save_reload_compare",
+    "save_and_open_by_the_dialog",
     "same_picture_as_headless",
     "idle_when_nothing_changes",
     "export_pictures",
