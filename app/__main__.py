@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 
-from app.cli.main import run
-
 
 def main() -> None:
     """Run the command line and exit with its code."""
+    try:
+        from app.cli.main import run
+    except KeyboardInterrupt:  # imports take a moment
+        sys.exit(130)
     sys.exit(run())
 
 

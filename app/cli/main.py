@@ -3,7 +3,7 @@
 A first argument that is no command is a scene for the window, so that both
 ``ltc-viewer scene.json`` and ``ltc-viewer shot scene.json -o a.png`` work.
 
-Exit codes: 0 success, 2 bad input, 1 any other failure. Results go to stdout,
+Exit codes: 0 success, 2 bad input, 1 any other failure, 130 after Ctrl+C. Results go to stdout,
 everything else to stderr. Errors are one sentence; with the environment
 variable LTC_VIEWER_TRACEBACK set, a traceback follows it.
 """
@@ -31,6 +31,7 @@ from app.scene import SceneError
 from app.scene_io import load_scene
 
 PROGRAM = "ltc-viewer"
+INTERRUPTED = 130
 TRACEBACK = "LTC_VIEWER_TRACEBACK"
 
 
@@ -155,7 +156,7 @@ def run(argv: Sequence[str] | None = None) -> int:
     except typer.Exit as error:
         return error.exit_code
     except (typer.Abort, KeyboardInterrupt):
-        return _fail("interrupted", 1)
+        code = INTERRUPTED
     except BrokenPipeError:
         # The reader of stdout went away; leave Python nothing to flush into it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -165,6 +166,8 @@ def run(argv: Sequence[str] | None = None) -> int:
         if usage is not None:
             return _fail(usage, 2)
         return _fail(f"internal error: {type(error).__name__}: {error}", 1)
+    if code == INTERRUPTED:  # typer's own code for Ctrl+C
+        return _fail("interrupted", INTERRUPTED)
     return code if isinstance(code, int) else 0
 
 
