@@ -370,15 +370,23 @@ class Renderer:
         )
         return {"specular": specular, "diffuse": diffuse}
 
-    def timings(self) -> dict[str, float]:
+    def timings(self, *, wait: bool = True) -> dict[str, float]:
         """Return the last time of each pass [ms]: gbuffer, lighting, display, and cpu.
 
+        Parameters
+        ----------
+        wait : bool
+            Whether to wait for the GPU. Without, a frame in flight is not held
+            up, and the figures are those of the sample before.
+
+        Notes
+        -----
         ``cpu`` is what submitting the last sample took here. `timing_source`
         says where the others come from; passes that did not run are missing.
         Where timer queries return nothing the renderer changes to the wall clock
         from then on, and draws the last shot's first sample again for its figures.
         """
-        figures = self._timers.milliseconds()
+        figures = self._timers.milliseconds(wait=wait)
         untrusted = self._timers.source == "timer queries" and not any(figures.values())
         if figures and untrusted and self._seen is not None:
             shot = self._seen.shot

@@ -12,15 +12,16 @@ import moderngl
 class PassTimers:
     """Times named passes. ``source`` says what the figures are.
 
-    With ``"timer queries"`` nothing waits until `milliseconds` is asked. With
-    ``"wall clock"`` every pass ends with a glFinish, so the figure contains
-    the driver's overhead and nothing overlaps.
+    With ``"timer queries"`` nothing waits until `milliseconds` is asked; each pass
+    has two queries in turn, so that the one before last can be read while the GPU
+    works on the last. With ``"wall clock"`` every pass ends with a glFinish, so
+    the figure contains the driver's overhead and nothing overlaps.
     """
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
-        self._queries: dict[str, moderngl.Query] = {}
-        self._pending: set[str] = set()
+        self._queries: dict[str, tuple[moderngl.Query, moderngl.Query]] = {}
+        self._unread: dict[str, list[moderngl.Query]] = {}
         self._milliseconds: dict[str, float] = {}
         self.source = "timer queries"
 
@@ -35,30 +36,38 @@ class PassTimers:
             self._milliseconds[name] = 1e3 * (time.perf_counter() - start)
             return
         if name not in self._queries:
-            self._queries[name] = self._ctx.query(time=True)
-        with self._queries[name]:
+            self._queries[name] = (self._ctx.query(time=True), self._ctx.query(time=True))
+        query, other = self._queries[name]
+        self._queries[name] = (other, query)
+        with query:
             yield
-        self._pending.add(name)
+        self._unread[name] = [*self._unread.get(name, []), query][-2:]
 
-    def milliseconds(self) -> dict[str, float]:
-        """Return the last figure of each pass [ms]; waits for the GPU."""
-        for name in self._pending:
-            self._milliseconds[name] = self._queries[name].elapsed * 1e-6
-        self._pending.clear()
+    def milliseconds(self, *, wait: bool = True) -> dict[str, float]:
+        """Return the last figure of each pass [ms].
+
+        Without ``wait`` that is the one before last where the last may still be
+        in the making, and passes that ran only once are missing.
+        """
+        for name, unread in self._unread.items():
+            if wait or len(unread) > 1:
+                query = unread[-1] if wait else unread[0]
+                self._milliseconds[name] = query.elapsed * 1e-6
+                self._unread[name] = [] if wait else unread[1:]
         return dict(self._milliseconds)
 
     def use_wall_clock(self) -> None:
         """Stop trusting timer queries."""
         self.source = "wall clock"
-        self._pending.clear()
+        self._unread.clear()
         self._milliseconds.clear()
 
     def forget(self, name: str) -> None:
         """Drop the figure of a pass that no longer runs."""
-        self._pending.discard(name)
+        self._unread.pop(name, None)
         self._milliseconds.pop(name, None)
 
     def release(self) -> None:
         """Drop the queries; moderngl deletes them with their context."""
         self._queries.clear()
-        self._pending.clear()
+        self._unread.clear()

@@ -538,6 +538,12 @@ def test_timings(renderer: Renderer) -> None:
     assert set(figures) == {"gbuffer", "lighting", "display", "cpu"}
     assert all(0.0 < ms < 60e3 for ms in figures.values())
     assert renderer.timing_source in ("timer queries", "wall clock")
+    # Without waiting: the sample before, so nothing new after the first.
+    for _ in range(3):
+        renderer.render(shot(one_light(), 1, 320, 180))
+        renderer.display()
+        assert set(renderer.timings(wait=False)) == set(figures)
+    assert renderer.timings(wait=False) != figures
     renderer.use_wall_clock()
     renderer.render(shot(one_light(), 1, 320, 180))
     renderer.display()
@@ -555,7 +561,8 @@ def test_timer_queries_that_return_nothing(renderer: Renderer) -> None:
     class Silent:
         elapsed = 0
 
-    renderer._timers._queries = dict.fromkeys(renderer._timers._queries, cast(Any, Silent()))
+    timers = renderer._timers
+    timers._unread = {name: [cast(Any, Silent())] for name in timers._unread}
     figures = renderer.timings()
     assert renderer.timing_source == "wall clock"
     assert all(figures[name] > 0.0 for name in ("gbuffer", "lighting", "display"))
