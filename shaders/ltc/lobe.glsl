@@ -6,6 +6,8 @@
 // determinant 2 q alpha and a diagonal, so the inverse is written down entry by
 // entry: nothing is inverted numerically and nothing cancels at small alpha.
 
+#include "ltc/polygon.glsl"
+
 struct IsotropicLobe {
     // Rows of cosine_from_shading = M^-1, scaled by alpha: (row0.x, 0, row0.y),
     // (0, row1, 0), (row2.x, 0, row2.y).
@@ -64,13 +66,6 @@ IsotropicLobe isotropic_lobe(float alpha, float sin_theta, float cos_theta, vec4
     lobe.above = 0.5 + 0.5 * m22 * inversesqrt(m20 * m20 + m22 * m22);
     return lobe;
 }
-
-// What carries points (directions) and edge planes (their normals) from the world
-// to where the lobe is a clamped cosine, up to positive factors.
-struct CosineTransform {
-    mat3 points;   // K = cosine_from_world
-    mat3 normals;  // the cofactor matrix of K: (K p) x (K q) = normals (p x q)
-};
 
 CosineTransform cosine_transform(IsotropicLobe lobe, mat3 world_from_shading)
 {

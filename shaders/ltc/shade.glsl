@@ -4,9 +4,9 @@
 #include "common/frame.glsl"
 #include "common/light_data.glsl"
 #include "common/material.glsl"
-#include "ltc/lobe.glsl"
 #include "ltc/polygon.glsl"
 #if HAS_SPECULAR
+#include "ltc/lobe.glsl"
 #include "ltc/table.glsl"
 #endif
 
@@ -185,7 +185,7 @@ vec3 shade_lights(
     return radiance;
 }
 
-#if HAS_SPECULAR && HAS_DIFFUSE
+#if PROBES
 // The two parts apart, for a white material: F = 1 and albedo 1.
 void probe_lights(
     sampler2D table_residual, sampler2D table_albedo,

@@ -352,7 +352,7 @@ def test_size_against_distance(renderer, ratio):
             ):
                 error = np.abs(gpu - ref)[keep] / np.maximum(ref[keep], 1e-20)
                 assert np.percentile(error, 90) <= 1e-5
-                assert error.max() <= 2e-4
+                assert error.max() <= 5e-4
 
 
 CASES = {

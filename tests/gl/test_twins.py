@@ -324,6 +324,6 @@ def test_cosine_light_pins_small_lights(glsl):
         result.x = cosine_light(CosineTransform(mat3(1.0), mat3(1.0)), light, view).pin;
     """
     got = glsl("ltc/polygon.glsl", body, {"d": distance})[:, 0]
-    far = f32(distance) > np.sqrt(2.0 / 0.04)
+    far = f32(distance) > np.sqrt(2.0 / 0.01)
     np.testing.assert_allclose(got[far], 1.0 / f32(distance)[far] ** 2, rtol=1e-6)
     assert not got[~far].any()
