@@ -496,7 +496,7 @@ class Viewport:
         finally:
             self._renderer.ctx.screen.use()
         self._failed, self._shot, self.samples = None, shot, (samples, settings.samples)
-        timings = self._renderer.timings()
+        timings = self._renderer.timings(wait=False)
         gpu = sum(value for name, value in timings.items() if name != "cpu") / 1e3
         self.history.append(1e3 * max(seconds, gpu))
         self._full_size_seconds = max(seconds, gpu) * divisor**2

@@ -144,14 +144,14 @@ class Window:
 
         params.docking_params = _layout(
             {
-                "Viewport": self._viewport_window,
-                "Scene": self._scene_window,
-                "Light": self._light_window,
-                "Material": self._material_window,
-                "Object": self._object_window,
-                "Display": self._display_window,
-                "Camera": self._camera_window,
-                "Performance": self._performance_window,
+                "Viewport": partial(self._guarded, self._viewport_window),
+                "Scene": partial(self._guarded, self._scene_window),
+                "Light": partial(self._guarded, self._light_window),
+                "Material": partial(self._guarded, self._material_window),
+                "Object": partial(self._guarded, self._object_window),
+                "Display": partial(self._guarded, self._display_window),
+                "Camera": partial(self._guarded, self._camera_window),
+                "Performance": partial(self._guarded, self._performance_window),
             }
         )
         return params
@@ -364,7 +364,7 @@ class Window:
         report = Report(
             passes=tuple(
                 (PASS_NAMES.get(name, name), value)
-                for name, value in self.renderer.timings().items()
+                for name, value in self.renderer.timings(wait=False).items()
             ),
             history=tuple(viewport.history),
             gpu=str(self.renderer.ctx.info["GL_RENDERER"]),

@@ -50,7 +50,7 @@ class PassTimers:
         in the making, and passes that ran only once are missing.
         """
         for name, unread in self._unread.items():
-            if wait or len(unread) > 1:
+            if unread and (wait or len(unread) > 1):
                 query = unread[-1] if wait else unread[0]
                 self._milliseconds[name] = query.elapsed * 1e-6
                 self._unread[name] = [] if wait else unread[1:]
