@@ -290,7 +290,8 @@ def _fields(value: Any, place: str, known: Iterable[str], kind: str) -> _Object:
         if key in _LATER:
             raise _PlaceError(
                 _step(place, key),
-                f"{_LATER[key]} are not supported by this version, expected polygons only",
+                f"{_LATER[key]} are not supported by this version, "
+                "expected polygons of constant radiance",
             )
         guess = nearest(key, known)
         meant = f" (did you mean '{guess}'?)" if guess else ""
@@ -398,7 +399,12 @@ def _build(place: str, owner: str, make: Callable[..., T], **values: Any) -> T:
     try:
         return make(**values)
     except SceneError as error:
-        raise _PlaceError(place, str(error).removeprefix(f"{owner}: ")) from None
+        message = str(error).removeprefix(f"{owner}: ")
+        field, _, rest = message.partition(" ")
+        if field in values and field != "name":
+            place = _step(place, field)
+            message = f"found {rest[3:]}" if rest.startswith("is ") else message
+        raise _PlaceError(place, message) from None
 
 
 def _scene(value: Any, base: Path) -> Scene:

@@ -185,7 +185,9 @@ CASES: dict[str, Case] = {
         scene(camera={"eye": [1e300, 0, 0]}), "camera.eye[0]", "between -1e+15 and 1e+15"
     ),
     # The values
-    "field of view": bad_scene(scene(camera={"fov_y": 200}), "camera", "200 degrees", "170"),
+    "field of view": bad_scene(
+        scene(camera={"fov_y": 200}), "camera.fov_y: found 200 degrees", "1 and 170"
+    ),
     "eye in the target": bad_scene(
         scene(camera={"eye": [1, 1, 1], "target": [1, 1, 1]}), "camera", "target equals eye"
     ),
@@ -193,29 +195,35 @@ CASES: dict[str, Case] = {
         scene(camera={"eye": [0, 9, 0], "target": [0, 0, 0]}), "camera", "parallel"
     ),
     "alpha too large": bad_scene(
-        scene(materials={"m": {"alpha": [2, 1]}}), "materials.m", "alpha", "between 0.0001 and 1"
+        scene(materials={"m": {"alpha": [2, 1]}}),
+        "materials.m.alpha: found (2.0, 1.0)", "between 0.0001 and 1",
     ),
     "alpha zero": bad_scene(scene(materials={"m": {"alpha": [0, 0]}}), "materials.m", "alpha"),
     "reflects more than all": bad_scene(
-        scene(materials={"m": {"diffuse": [0.5, 1.5, 0.5]}}), "materials.m", "between 0 and 1"
+        scene(materials={"m": {"diffuse": [0.5, 1.5, 0.5]}}),
+        "materials.m.diffuse", "between 0 and 1",
     ),
     "negative radiance": bad_scene(
-        scene(lights=[{"radiance": [1, -1, 1]}]), "lights[0]", "radiance", "0 or more"
+        scene(lights=[{"radiance": [1, -1, 1]}]),
+        "lights[0].radiance: found (1.0, -1.0, 1.0)", "0 or more",
     ),
     "no unit quaternion": bad_scene(
         scene(objects=[{"transform": {"rotate": [2, 0, 0, 0]}}]),
-        "objects[0].transform", "length 2", "unit quaternion",
+        "objects[0].transform.rotate", "length 2", "unit quaternion",
     ),
     "scale of zero": bad_scene(
-        scene(objects=[{"transform": {"scale": [1, 0, 1]}}]), "objects[0].transform", "no zero"
+        scene(objects=[{"transform": {"scale": [1, 0, 1]}}]),
+        "objects[0].transform.scale", "no zero",
     ),
     "parallel plane": bad_scene(
-        scene(lights=[{}, {"plane": {"u": [0, 2, 0]}}]), "lights[1].plane", "parallel"
+        scene(lights=[{}, {"plane": {"u": [0, 2, 0]}}]), "lights[1].plane.u", "parallel"
     ),
     "tone map": bad_scene(
         scene(display={"tone_map": "acse"}), "display.tone_map", "did you mean 'aces'"
     ),
-    "exposure": bad_scene(scene(display={"exposure": 99}), "display", "between -32 and 32"),
+    "exposure": bad_scene(
+        scene(display={"exposure": 99}), "display.exposure", "between -32 and 32"
+    ),
     "unknown material": bad_scene(
         scene(materials={"floor": {}}, objects=[{"material": "flor"}]),
         "objects[0].material", "'flor'", "did you mean 'floor'",
