@@ -78,12 +78,12 @@ class LightNeeds:
     def of(cls, lights: Sequence[AreaLight], limits: Limits) -> LightNeeds:
         """Raise `InputError` if the lights are more, or larger, than the machine can hold."""
         geometries = [light_geometry(light) for light in lights]
-        shining = [light for light in lights if any(light.radiance)]
-        edges = sum(
-            len(geometry.edges)
+        shining = [
+            (light, len(geometry.edges))
             for light, geometry in zip(lights, geometries, strict=True)
-            if any(light.radiance)
-        )
+            if any(light.radiance) and len(geometry.edges)
+        ]
+        edges = sum(count for _, count in shining)
         texels = TEXELS_PER_LIGHT * len(lights) + TEXELS_PER_EDGE * edges
         if texels > limits.storage_texels:
             raise InputError(
@@ -95,8 +95,8 @@ class LightNeeds:
             len(lights),
             edges,
             texels,
-            any(not light.two_sided for light in shining),
-            any(light.two_sided for light in shining),
+            any(not light.two_sided for light, _ in shining),
+            any(light.two_sided for light, _ in shining),
             rounded if 16 * rounded <= limits.uniform_block_bytes else 0,
             limits.exact_fma,
         )

@@ -22,7 +22,7 @@ from app.render.tables import isotropic_textures
 from app.render.techniques import TECHNIQUES, check_technique
 from app.scene import TONE_MAPS, Scene, Shot
 
-FORMAT_BYTES = {"RGBA32F": 16, "RGBA8": 4, "DEPTH24": 4}
+FORMAT_BYTES = {"RGBA32F": 16, "RG32F": 8, "RGBA8": 4, "DEPTH24": 4}
 """Bytes of a pixel; 24 bits of depth are stored in 32."""
 
 
@@ -97,10 +97,11 @@ class PlannedResource:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something that this shot does without, and why."""
+    """Something that this shot does without, why, and the bytes that it would take."""
 
     what: str
     why: str
+    bytes: int = 0
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,11 @@ class Plan:
                 for part in resources
             ] or ["  none"]
         lines += ["", f"Allocated: {format_bytes(self.bytes)}", "", "Left out"]
-        lines += [f"  {left.what}: {left.why}" for left in self.left_out] or ["  nothing"]
+        for left in self.left_out:
+            saved = f" (saves {format_bytes(left.bytes)})" if left.bytes else ""
+            lines.append(f"  {left.what}: {left.why}{saved}")
+        if not self.left_out:
+            lines.append("  nothing")
         return "\n".join(lines) + "\n"
 
 
@@ -297,8 +302,10 @@ def _left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
     shines = lights.one_sided or lights.two_sided
     out: list[LeftOut] = []
 
-    def leave(what: str, why: str) -> None:
-        out.append(LeftOut(what, why))
+    pixels = shot.width * shot.height
+
+    def leave(what: str, why: str, saved: int = 0) -> None:
+        out.append(LeftOut(what, why, saved))
 
     if not scene.lights:
         dark = "the scene has no lights"
@@ -309,12 +316,15 @@ def _left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
     else:
         dark = ""
     if not features.lit:
-        leave("G-buffer and its program", dark or "nothing reflects and no light is visible")
-        leave("lighting program", dark or "nothing reflects and no light is visible")
+        why = dark or "nothing reflects and no light is visible"
+        bytes_each = FORMAT_BYTES["RGBA32F"] + FORMAT_BYTES["DEPTH24"]
+        leave("G-buffer and its program", why, pixels * bytes_each)
+        leave("lighting program", why)
     if not features.specular:
         why = dark or "every material has f0 = 0"
         leave("specular shading", why)
-        leave("tables of the technique", f"{why}, so nothing looks them up")
+        tables = sum(int(texels.nbytes) for texels in isotropic_textures())
+        leave("tables of the technique", f"{why}, so nothing looks them up", tables)
     if not features.diffuse:
         leave("diffuse shading", dark or "every material has diffuse = 0")
     if not features.shades and features.lit:
@@ -326,9 +336,17 @@ def _left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
     if features.shades and not lights.one_sided:
         leave("test for dark sides", "every light is two-sided")
     if features.lit and not features.accumulates:
-        leave("second radiance attachment and averaging", "one sample per pixel needs no history")
+        leave(
+            "second radiance attachment and averaging",
+            "one sample per pixel needs no history",
+            pixels * FORMAT_BYTES["RGBA32F"],
+        )
     if features.lit:
-        leave("second G-buffer attachment (tangents)", "technique ltc shades no anisotropic lobes")
+        leave(
+            "second G-buffer attachment (tangents)",
+            "technique ltc shades no anisotropic lobes",
+            pixels * FORMAT_BYTES["RG32F"],
+        )
     others = [name for name in TONE_MAPS if name != scene.display.tone_map]
     leave("other tone maps", f"{', '.join(others)} are not chosen")
     return tuple(out)

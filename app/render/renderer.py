@@ -21,7 +21,7 @@ from app.render.camera import CameraFrame
 from app.render.features import LightNeeds, Limits, used_materials
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
-from app.render.plan import Needs, Plan, make_plan, needs_of
+from app.render.plan import FORMAT_BYTES, Needs, Plan, make_plan, needs_of
 from app.render.post import DisplayPass
 from app.render.programs import Programs
 from app.render.sampling import pixel_offset
@@ -29,8 +29,6 @@ from app.render.state import begin_pass, release_framebuffer
 from app.render.techniques import check_technique
 from app.render.timers import PassTimers
 from app.scene import Display, RenderSettings, Scene, Shot
-
-_BYTES_PER_PIXEL = {"RGBA32F": 16, "RGBA8": 4, "DEPTH24": 4}
 
 
 @dataclass(frozen=True)
@@ -122,11 +120,11 @@ class _Targets:
     def allocated(self) -> dict[str, int]:
         pixels = self.size[0] * self.size[1]
         held = {
-            name: pixels * _BYTES_PER_PIXEL["RGBA8" if name == "display" else "RGBA32F"]
+            name: pixels * FORMAT_BYTES["RGBA8" if name == "display" else "RGBA32F"]
             for name in self._textures
         }
         if self._depth is not None:
-            held["depth"] = pixels * _BYTES_PER_PIXEL["DEPTH24"]
+            held["depth"] = pixels * FORMAT_BYTES["DEPTH24"]
         return held
 
     def release(self) -> None:

@@ -70,6 +70,13 @@ def test_lights_decide_sides_and_shapes() -> None:
     assert not features(scene(GLOSSY, KEY, dark)).lights.two_sided
 
 
+def test_lights_without_an_inside_do_not_count() -> None:
+    line = Outline((PolygonContour(((0.0, 0.0), (1.0, 0.0), (2.0, 0.0))),))
+    flat = replace(KEY, name="flat", outline=line, two_sided=True)
+    assert not features(scene(GLOSSY, KEY, flat)).lights.two_sided
+    assert not features(scene(GLOSSY, flat)).lit
+
+
 def test_nothing_to_see_needs_no_lighting_program() -> None:
     no_lights = replace(scene(), lights=())
     dark_and_hidden = scene(GLOSSY, replace(KEY, radiance=(0.0, 0.0, 0.0), visible=False))
@@ -148,6 +155,8 @@ def test_plans_differ_by_scene() -> None:
     assert {left.what for left in matte.left_out} > {"specular shading", "tables of the technique"}
     assert not {left.what for left in many.left_out} & {"specular shading", "diffuse shading"}
     assert matte.bytes < glossy.bytes < many.bytes
+    saved = sum(left.bytes for left in matte.left_out if left.what == "tables of the technique")
+    assert matte.bytes + saved == glossy.bytes
     for p in (matte, glossy, many):
         assert p.title in p.text()
         assert all(left.why in p.text() for left in p.left_out)

@@ -191,6 +191,21 @@ def test_the_mean_of_samples_is_their_mean(renderer: Renderer) -> None:
     np.testing.assert_allclose(mean, total / 8, rtol=2e-6, atol=1e-6)
 
 
+def test_the_mean_survives_65536_samples() -> None:
+    """The shader's running mean in float32, against float64: it forgets its roundings."""
+    rng = np.random.default_rng(11)
+    scale = np.geomspace(1e-4, 1e4, 48).astype(np.float32)
+    noise = np.repeat(np.array([0.0, 1e-3, 1.0], dtype=np.float32), 16)
+    mean, exact = np.zeros(48, dtype=np.float32), np.zeros(48)
+    for sample in range(65536):
+        value = scale * (1 + noise * (rng.random(48, dtype=np.float32) - np.float32(0.5)))
+        weight = np.float32(1.0 / (sample + 1))
+        mean = value if sample == 0 else mean + (value - mean) * weight
+        exact += value
+    # Half units in the last place, damped, walk at random: 2^-25 sqrt(65536) = 8e-6.
+    np.testing.assert_allclose(mean, exact / 65536, rtol=2e-5)
+
+
 def test_idle_draws_nothing(renderer: Renderer) -> None:
     wanted = shot(one_light(), 2)
     for _ in range(2):
