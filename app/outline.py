@@ -27,8 +27,8 @@ caller's very float64 coordinates; only true crossings carry the grid's rounding
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from typing import TypeVar
 
@@ -57,12 +57,13 @@ PAIRS_AT_ONCE = 1_000_000
 SHRINKS = (0.0, 1e-6, 1e-4, 1e-2)
 """How far holes are drawn together for triangulation, in lengths of their edges, tried in turn."""
 
-CACHED_OUTLINES = 4096
+CACHED_VERTICES = 1_000_000
+"""Of the outlines whose results are kept; beyond it the longest unused ones go."""
 
 
 @dataclass(frozen=True)
 class _Region:
-    """A connected piece: an outer loop, counter-clockwise, and its holes, clockwise."""
+    """A connected part: an outer loop, counter-clockwise, and its holes, clockwise."""
 
     outer: FloatArray
     holes: tuple[FloatArray, ...]
@@ -84,7 +85,8 @@ def resolve(outline: Outline) -> tuple[FloatArray, ...]:
         by its holes, clockwise. No repeated or collinear vertices, no loops
         without area; empty if nothing is inside.
     """
-    return tuple(loop for region in _regions(outline) for loop in (region.outer, *region.holes))
+    regions = _kept(outline).regions
+    return tuple(loop for region in regions for loop in (region.outer, *region.holes))
 
 
 def area(outline: Outline) -> float:
@@ -99,7 +101,6 @@ def signed_area(loop: FloatArray) -> float:
     return 0.5 * float(np.sum(local[:, 0] * following[:, 1] - local[:, 1] * following[:, 0]))
 
 
-@lru_cache(maxsize=CACHED_OUTLINES)
 def triangulate(outline: Outline) -> tuple[FloatArray, Triangles]:
     """Return triangles that cover an outline's inside once.
 
@@ -116,10 +117,17 @@ def triangulate(outline: Outline) -> tuple[FloatArray, Triangles]:
     and touch themselves it missed a sliver or covered one twice in fewer than
     one. `resolve`, which the light is computed from, has no such exceptions.
     """
+    kept = _kept(outline)
+    if kept.triangulation is None:
+        kept.triangulation = _triangulated(kept.regions)
+    return kept.triangulation
+
+
+def _triangulated(regions: tuple[_Region, ...]) -> tuple[FloatArray, Triangles]:
     points: list[FloatArray] = []
     triangles: list[Triangles] = []
     start = 0
-    for region in _regions(outline):
+    for region in regions:
         loops = (region.outer, *region.holes)
         vertices = np.concatenate(loops)
         ends = np.cumsum([len(loop) for loop in loops]).astype(np.uint32)
@@ -185,7 +193,41 @@ def _frozen(array: Array) -> Array:
     return array
 
 
-@lru_cache(maxsize=CACHED_OUTLINES)
+@dataclass
+class _Kept:
+    """What is known of an outline; triangles only once they were asked for."""
+
+    regions: tuple[_Region, ...]
+    triangulation: tuple[FloatArray, Triangles] | None = None
+
+
+class _Cache:
+    """Keeps what was used last, by number of vertices: a drag makes many outlines."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[Outline, _Kept] = OrderedDict()
+        self._vertices = 0
+
+    def __call__(self, outline: Outline) -> _Kept:
+        """Look an outline up, or resolve it."""
+        kept = self._kept.get(outline)
+        if kept is None:
+            kept = self._kept[outline] = _Kept(_regions(outline))
+            self._vertices += _size(outline)
+            while self._vertices > CACHED_VERTICES and len(self._kept) > 1:
+                oldest, _ = self._kept.popitem(last=False)
+                self._vertices -= _size(oldest)
+        self._kept.move_to_end(outline)
+        return kept
+
+
+_kept = _Cache()
+
+
+def _size(outline: Outline) -> int:
+    return sum(len(contour.points) for contour in outline.contours)
+
+
 def _regions(outline: Outline) -> tuple[_Region, ...]:
     contours = [np.asarray(contour.points, dtype=np.float64) for contour in outline.contours]
     everything = np.concatenate(contours)

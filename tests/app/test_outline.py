@@ -11,6 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+import app.outline
 from app.outline import area, contains, resolve, signed_area, triangulate
 from app.scene import FILL_RULES, FillRule, Outline, PolygonContour
 
@@ -240,6 +241,18 @@ def test_loops_are_read_only_and_cached() -> None:
     with pytest.raises(ValueError, match="read-only"):
         loops[0][0, 0] = 5.0
     assert resolve(outline(SQUARE))[0] is loops[0]
+
+
+def test_the_cache_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    cache = app.outline._Cache()
+    monkeypatch.setattr(app.outline, "CACHED_VERTICES", 40)
+    monkeypatch.setattr(app.outline, "_kept", cache)
+    first = outline(SQUARE)
+    kept = cache(first)
+    for k in range(1, 30):
+        resolve(outline(scaled(SQUARE, 1.0 + k)))
+        assert cache(first) is kept, "what is in use stays"
+    assert len(cache._kept) == 10
 
 
 @pytest.mark.parametrize("thickness", [1e-3, 1e-6, 1e-9])
