@@ -46,6 +46,9 @@ from app.vectors import (
 FloatArray = NDArray[np.float64]
 _Items: TypeAlias = tuple[Material | SceneObject | AreaLight, ...]
 
+NEW_MATERIAL = Material("new", (0.4, 0.4, 0.4), (0.04, 0.04, 0.04), (0.0625, 0.0625))
+"""What a new object is made of: grey, satin."""
+
 # --- planes ---------------------------------------------------------------
 
 
@@ -387,8 +390,8 @@ def add_light(scene: Scene) -> tuple[Scene, int]:
     away = subtract(camera.target, camera.eye)
     distance = length(away)
     flat = normalize(subtract(away, scale(up, dot(away, up))))
-    origin = add(camera.target, add(scale(up, 0.35 * distance), scale(flat, 0.25 * distance)))
-    half = 0.12 * distance
+    origin = add(camera.target, add(scale(up, 0.22 * distance), scale(flat, 0.35 * distance)))
+    half = 0.16 * distance
     right = normalize(cross(flat, up))
     normal = normalize(subtract(camera.target, origin))
     across = scale(right, -1.0)
@@ -404,15 +407,24 @@ def add_light(scene: Scene) -> tuple[Scene, int]:
 def add_object(
     scene: Scene, mesh: str, name: str, transform: Transform | None = None
 ) -> tuple[Scene, int]:
-    """Add a mesh (built-in name or absolute path) with the first material; return its index."""
-    materials = scene.materials or (Material("material"),)
+    """Add a mesh (built-in name or absolute path) with a material of its own; return its index.
+
+    Without a transform, spheres and boxes are half as large as they come and
+    stand on the ground.
+    """
+    if transform is None:
+        transform = Transform()
+        if mesh in ("sphere", "box"):
+            transform = Transform((0.0, 0.5, 0.0), scale=(0.5, 0.5, 0.5))
+    material = replace(NEW_MATERIAL, name=unique_name(name, (m.name for m in scene.materials)))
     item = SceneObject(
         name=unique_name(name, (item.name for item in scene.objects)),
         mesh=mesh,
-        material=materials[0].name,
-        transform=transform or Transform(),
+        material=material.name,
+        transform=transform,
     )
-    return replace(scene, materials=materials, objects=(*scene.objects, item)), len(scene.objects)
+    grown = replace(scene, materials=(*scene.materials, material), objects=(*scene.objects, item))
+    return grown, len(scene.objects)
 
 
 def remove_light(scene: Scene, index: int) -> Scene:
@@ -560,6 +572,10 @@ def describe(before: Scene, after: Scene) -> str:
                 continue
             if a.name != b.name:
                 return f"Rename {kind} '{a.name}'"
+            if isinstance(a, AreaLight) and isinstance(b, AreaLight):
+                more = len(b.outline.contours) - len(a.outline.contours)
+                if more:
+                    return f"{'Add' if more > 0 else 'Remove'} outline of '{a.name}'"
             return f"Change {_first_difference(a, b)} of '{a.name}'"
     if before.display != after.display:
         return f"Change {_first_difference(before.display, after.display)}"
@@ -568,9 +584,9 @@ def describe(before: Scene, after: Scene) -> str:
 
 def _lists_of(before: Scene, after: Scene) -> tuple[tuple[str, _Items, _Items], ...]:
     return (
-        ("material", before.materials, after.materials),
-        ("object", before.objects, after.objects),
         ("light", before.lights, after.lights),
+        ("object", before.objects, after.objects),
+        ("material", before.materials, after.materials),
     )
 
 

@@ -818,8 +818,8 @@ def spoken(name: str) -> str:
 
 def new_scene() -> Scene:
     """Return what "New" shows: a glossy floor and one light over it."""
-    floor = Material("floor", (0.1, 0.1, 0.1), (0.04, 0.04, 0.04), (0.04, 0.04))
-    ground = SceneObject("floor", "plane", "floor", Transform(scale=(10.0, 10.0, 10.0)))
+    floor = Material("floor", (0.25, 0.25, 0.25), (0.05, 0.05, 0.05), (0.0225, 0.0225))
+    ground = SceneObject("floor", "plane", "floor", Transform(scale=(6.0, 6.0, 6.0)))
     return edits.add_light(Scene(materials=(floor,), objects=(ground,)))[0]
 
 

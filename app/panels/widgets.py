@@ -94,11 +94,15 @@ def numbers(
     """Draw two or three numbers to drag or, by double-click, to type."""
     identity = label(text, tip)
     draw = {2: imgui.drag_float2, 3: imgui.drag_float3}[len(values)]
-    changed, new = draw(identity, list(values), speed, 0.0, 0.0, form)
+    shown = [round(value, 9) + 0.0 for value in values]  # no "-0.000"
+    changed, new = draw(identity, shown, speed, 0.0, 0.0, form)
     tooltip(tip)
     if not changed:
         return tuple(values)
-    return tuple(_untouched(a, b) for a, b in zip(values, new, strict=True))
+    return tuple(
+        value if np.float32(was) == np.float32(now) else tidy(now)
+        for value, was, now in zip(values, shown, new, strict=True)
+    )
 
 
 def position(text: str, value: Vec3, tip: str = "") -> Vec3:

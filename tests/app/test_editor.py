@@ -331,9 +331,12 @@ def test_an_object_of_a_shared_material_gets_its_own() -> None:
     assert own.objects[0].material == "floor"
 
 
-def test_a_mesh_comes_with_a_material() -> None:
-    scene, index = edits.add_object(Scene(), "box", "box")
-    assert scene.objects[index].material == scene.materials[0].name
+def test_a_mesh_comes_with_a_material_of_its_own_and_stands_on_the_ground() -> None:
+    scene, index = edits.add_object(SCENE, "box", "metal")
+    assert scene.objects[index].material == "metal 2"
+    assert scene.materials[:-1] == SCENE.materials
+    placed = scene.objects[index].transform
+    assert placed.translate[1] == placed.scale[1]
 
 
 @pytest.mark.parametrize(
@@ -341,6 +344,8 @@ def test_a_mesh_comes_with_a_material() -> None:
     [
         (edits.add_light(SCENE)[0], "Add light 'light'"),
         (edits.remove_light(SCENE, 1), "Remove light 'fill'"),
+        (edits.add_object(SCENE, "box", "box")[0], "Add object 'box'"),
+        (edits.replace_light(SCENE, 0, edits.add_hole(LIGHT)), "Add outline of 'key'"),
         (edits.rename_object(SCENE, 1, "orb"), "Rename object 'ball'"),
         (
             edits.replace_material(SCENE, "metal", replace(SCENE.materials[1], alpha=(0.1, 0.1))),
