@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"python -m ltc: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"python -m ltc: {error.filename}: {error.strerror}", file=sys.stderr)
+        print(f"python -m ltc: {error}", file=sys.stderr)
         return 1
 
 

@@ -1,6 +1,55 @@
 """Fit the isotropic table to GGX: ``python -m ltc fit isotropic``.
 
-See `fit_isotropic`.
+What is minimised
+    M = M0 (I + X), X bicubic between nodes (`ltc.table`). The unknowns are the nodes,
+    all at once, so a node gets the value that interpolates best rather than
+    the one that fits best where it stands. The loss is the mean error of the
+    technique as rendered (light clipped at the surface, transformed, clipped, form
+    factor, times A / (1 - leak)) over random rectangles, absolute above 1e-3
+    and with the square added at weight 50; plus .03 of the mean total
+    variation between lobe and GGX, which holds where few rectangles look; plus a
+    little smoothness. Targets are exact (`ltc.reference`), derivatives
+    analytic, steps Levenberg-Marquardt on reweighted normal equations.
+
+Measured (`random_configurations`, 4,000 rectangles and 2,000 octagons with seeds
+of their own, read through the GPU's textures; absolute error, radiance 1)
+
+    ==========  ======  =====  =====  =====
+    lights      mean    p95    p99    max
+    ==========  ======  =====  =====  =====
+    rectangles  .00195  .0087  .0202  .076
+    octagons    .00192  .0086  .0200  .050
+    ==========  ======  =====  =====  =====
+
+    Rectangles by theta 0-30, 30-60, 60-75, 75-87, 87-89.9 degrees: .00064, .00101,
+    .00254, .0052, .0098; by alpha .001-.01-.1-.3-.6-1: .0003, .0016, .0033,
+    .0023, .0010. At alpha 1e-4 to 1e-3 with an edge through every lobe: .0003.
+    Above 87 degrees one lobe is not the shape of GGX; the largest error is at
+    alpha .033, theta 88.9.
+
+Compared (mean, p99, max on the same rectangles)
+
+    ===============================  ======  =====  ====
+    M0 alone                         .0111   .094   .192
+    bicubic 4^2 nodes (256 bytes)    .00226  .0224  .068
+    bicubic 6^2                      .00197  .0191  .080
+    bicubic 8^2 (1 KB), the default  .00195  .0202  .076
+    bicubic 10^2                     .00195  .0203  .073
+    bicubic 16^2                     .00195  .0202  .076
+    bilinear 8^2                     .00197  .0200  .084
+    bilinear 16^2                    .00195  .0198  .080
+    bilinear 24^2                    .00198  .0206  .084
+    8^2 without / (1 - leak)         .00214  .0236  .054
+    8^2, no squared error            .00194  .0201  .076
+    8^2, total variation at .3       .0025   .028   .072
+    ===============================  ======  =====  ====
+
+    Differences under .0001 are noise: what is left is the lobe's shape, not the
+    table. The last two rows were taken with a slightly weaker smoothness.
+
+Time: 44 to 57 s on two busy cores (25 s the exact integrals of 40,000 rectangles, 10 s
+nine steps, 5 s the error figures). The result depends on the seed and the library
+versions alone; a checkpoint beside the output lets an interrupted fit go on.
 """
 
 from __future__ import annotations
@@ -678,16 +727,20 @@ def _add_targets(work: _Work, cases: Configurations, checkpoint: Path, report: R
     """Complete ``work.exact``, saving it now and then."""
     begin, start, saved = time.monotonic(), work.exact.size, 0.0
     count = cases.alpha.size
-    for first in range(start, count, _CHUNK):
-        part = slice(first, first + _CHUNK)
-        chunk = Configurations(cases.alpha[part], cases.cos_theta[part], cases.corners[part])
-        work.exact = np.concatenate([work.exact, exact_integrals(chunk)])
-        now, done = time.monotonic() - begin, work.exact.size
-        if now - saved > _SAVE_EVERY or done == count:
-            saved = now
-            work.save(checkpoint)
-            left = now / (done - start) * (count - done)
-            report(f"exact integrals: {done} of {count}, {left:.0f} s left")
+    try:
+        for first in range(start, count, _CHUNK):
+            part = slice(first, first + _CHUNK)
+            chunk = Configurations(cases.alpha[part], cases.cos_theta[part], cases.corners[part])
+            work.exact = np.concatenate([work.exact, exact_integrals(chunk)])
+            now, done = time.monotonic() - begin, work.exact.size
+            if now - saved > _SAVE_EVERY or done == count:
+                saved = now
+                work.save(checkpoint)
+                left = now / (done - start) * (count - done)
+                report(f"exact integrals: {done} of {count}, {left:.0f} s left")
+    except KeyboardInterrupt:
+        work.save(checkpoint)
+        raise
 
 
 def measure(

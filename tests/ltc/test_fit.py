@@ -176,7 +176,6 @@ class TestFitting:
     def test_interrupted_it_continues_to_the_same_result(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, after: int
     ) -> None:
-        monkeypatch.setattr(fit, "_SAVE_EVERY", 0.0)
         fit_isotropic(tmp_path / "whole.npz", **SETTINGS)
         output = tmp_path / "out.npz"
         output.write_bytes(b"old")

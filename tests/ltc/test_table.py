@@ -164,7 +164,7 @@ class TestShipped:
         M, _, _ = table.sample_textures((residual, albedo), alpha, c)
         change = np.linalg.solve(shipped.matrix(alpha, c), M) - np.eye(3)
         assert np.mean(np.abs(change)) < 0.002
-        assert np.max(np.abs(change)) < 0.1
+        assert np.max(np.abs(change)) < 0.03
 
     def test_is_regular_everywhere(self, shipped: IsotropicTable) -> None:
         alpha = np.array([0.0, 1e-4, 3e-4, 1e-3, 0.01, 0.1, 0.5, 1.0])[:, None]
