@@ -144,10 +144,10 @@ class Programs:
         except moderngl.Error as error:
             # A failed link leaves its error flag behind, which is not the caller's.
             _ = self._ctx.error
-            raise _shader_error(spec, sources, str(error)) from error
+            raise shader_error(spec, sources, str(error)) from error
 
 
-def _shader_error(spec: ProgramSpec, sources: tuple[Source, Source], log: str) -> ShaderError:
+def shader_error(spec: ProgramSpec, sources: tuple[Source, Source], log: str) -> ShaderError:
     """Return a driver's log as an error that names our file and line."""
     source = sources[0] if "vertex_shader" in log else sources[1]
     found = _LOG_LINE.search(log)
