@@ -201,7 +201,7 @@ class Renderer:
             self._seen is None
             or self._stale
             or not self._seen.same_radiance(shot)
-            or (limit > 1 and self._needs is not None and not self._needs.accumulates)
+            or (limit > 1 and self._needs is not None and not self._needs.lighting.accumulates)
         )
         if restart:
             self._begin(shot, limit)

@@ -78,6 +78,7 @@ def test_no_lights_is_black(renderer: Renderer) -> None:
     assert not renderer.radiance().any()
     assert not renderer.display().any()
     assert renderer.lighting_passes == 0
+    assert [renderer.accumulate(shot(DARK), 3) for _ in range(4)] == [1, 2, 3, 3]
 
 
 def test_everything_is_finite(renderer: Renderer) -> None:
