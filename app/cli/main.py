@@ -26,7 +26,7 @@ from app.cli.common import FailureError, messages, scene_path
 from app.cli.explain import explain
 from app.cli.probe import probe
 from app.cli.shot import shot
-from app.errors import InputError, nearest
+from app.errors import InputError, nearest, os_reason
 from app.scene import SceneError
 from app.scene_io import load_scene
 
@@ -41,7 +41,7 @@ class SceneOrCommandGroup(TyperGroup):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Put the hidden command ``window`` before arguments that name no command."""
         first = args[0] if args else ""
-        own_options = {"--help", "--version"}
+        own_options = {"-h", "--help", "--version"}
         if first not in self.commands and first not in own_options:
             _refuse_misspelt_command(first, [name for name in self.commands if name != "window"])
             args = ["window", *args]
@@ -63,7 +63,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
-    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
@@ -161,6 +161,8 @@ def run(argv: Sequence[str] | None = None) -> int:
         # The reader of stdout went away; leave Python nothing to flush into it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except OSError as error:  # a full disk, say
+        return _fail(f"{error.filename or 'output'}: {os_reason(error)}", 1)
     except Exception as error:
         usage = _usage_sentence(error)
         if usage is not None:

@@ -54,7 +54,8 @@ def probe(
     specular and diffuse, (n, 3) float32 radiance of a white material (F = 1,
     albedo 1) summed over the scene's lights, and the name of the technique.
     Directions off unit length by up to 0.001 are normalised, others are
-    errors; the tangent is made perpendicular to the normal.
+    errors; the tangent is made perpendicular to the normal. A view from below
+    the surface is shaded as the lighting pass shades one: as if at grazing.
 
     \b
     Example:

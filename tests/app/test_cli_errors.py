@@ -534,9 +534,10 @@ def test_an_error_of_the_program_is_exit_code_1(
     assert "Traceback" in capfd.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["-h", "--help"])
 @pytest.mark.parametrize("command", ["shot", "probe", "bench", "explain"])
-def test_help_shows_an_example(command: str) -> None:
-    result = CliRunner().invoke(app, [command, "--help"])
+def test_help_shows_an_example(command: str, option: str) -> None:
+    result = CliRunner().invoke(app, [command, option])
     assert result.exit_code == 0
     assert f"ltc-viewer {command} " in result.stdout
     assert "Example" in result.stdout
