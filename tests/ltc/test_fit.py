@@ -176,6 +176,7 @@ class TestFitting:
     def test_interrupted_it_continues_to_the_same_result(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, after: int
     ) -> None:
+        monkeypatch.setattr(fit, "_SAVE_EVERY", 0.0)  # report after every chunk
         fit_isotropic(tmp_path / "whole.npz", **SETTINGS)
         output = tmp_path / "out.npz"
         output.write_bytes(b"old")
@@ -195,6 +196,25 @@ class TestFitting:
         assert output.read_bytes() == (tmp_path / "whole.npz").read_bytes()
         assert work["integrals"] == SETTINGS["configurations"]
         assert not fit.checkpoint_path(output).exists()
+
+    def test_an_interrupt_amid_the_integrals_loses_one_chunk(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        exact, calls = fit.exact_integrals, 0
+
+        def third_time(cases: Configurations) -> FloatArray:
+            nonlocal calls
+            calls += 1
+            if calls == 3:
+                raise KeyboardInterrupt
+            return exact(cases)
+
+        monkeypatch.setattr(fit, "exact_integrals", third_time)
+        output = tmp_path / "out.npz"
+        with pytest.raises(KeyboardInterrupt):
+            fit_isotropic(output, **SETTINGS)
+        fit_isotropic(output, **SETTINGS)
+        assert calls == 4  # of three chunks only the third was done again
 
     def test_foreign_and_damaged_checkpoints_are_refused(self, tmp_path: Path) -> None:
         output = tmp_path / "out.npz"
