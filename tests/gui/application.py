@@ -13,6 +13,7 @@ import imgui_bundle  # noqa: F401  (first: glfw then takes the library that imgu
 import glfw
 # isort: on
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -24,7 +25,8 @@ from app.scene import Scene, Vec3
 from app.window import Window
 
 test_engine = imgui.test_engine
-MOST_FRAMES = 400
+PATIENCE = 30.0
+"""Seconds after which something waited for counts as not happening."""
 
 
 class Application:
@@ -69,19 +71,14 @@ class Application:
     def settle(self) -> None:
         """Run frames until nothing is left to do."""
         self.frame()
-        for _ in range(MOST_FRAMES):
-            if self.window.viewport.is_idle:
-                return
-            self.frame()
-        raise AssertionError("the picture never settles")
+        self.until(lambda: self.window.viewport.is_idle)
 
     def until(self, condition: Callable[[], bool]) -> None:
         """Run frames until something is so."""
-        for _ in range(MOST_FRAMES):
-            if condition():
-                return
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < end, f"it does not happen within {PATIENCE:g} s"
             self.frame()
-        raise AssertionError("it never happens")
 
     def pixels(self) -> np.ndarray:
         """Return the window's picture after one more frame, (h, w, 3) uint8, row 0 at the top."""
@@ -125,10 +122,8 @@ class Application:
         test = test_engine.register_test(self._engine, "gui", f"action {self._tests}")
         test.test_func = guarded
         test_engine.queue_test(self._engine, test)
-        for _ in range(4 * MOST_FRAMES):
-            self.frame()
-            if test_engine.is_test_queue_empty(self._engine):
-                break
+        self.frame()
+        self.until(lambda: test_engine.is_test_queue_empty(self._engine))
         if failures:
             raise failures[0]
         status = test.output.status
