@@ -39,6 +39,7 @@ class Limits:
 
     @classmethod
     def of(cls, ctx: moderngl.Context) -> Limits:
+        """Return what a context allows."""
         info = ctx.info
         viewport = info["GL_MAX_VIEWPORT_DIMS"]
         return cls(
@@ -102,6 +103,7 @@ class LightNeeds:
         )
 
     def defines(self) -> dict[str, int]:
+        """Return the numbers that shaders which read lights are assembled with."""
         return {
             "HAS_ONE_SIDED": int(self.one_sided),
             "HAS_TWO_SIDED": int(self.two_sided),

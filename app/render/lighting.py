@@ -57,6 +57,7 @@ class LightingPass:
 
     @property
     def uploads(self) -> dict[str, int]:
+        """How often lights and materials were sent to the GPU."""
         return {"lights": self._lights.uploads, "materials": self._materials.uploads}
 
     def set_lights(self, lights: Sequence[AreaLight], needs: LightNeeds) -> None:

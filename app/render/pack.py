@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from app.errors import InputError
 from app.outline import resolve, triangulate
-from app.scene import AreaLight, Material, Plane, Vec2
+from app.scene import AreaLight, Material, Plane
 
 FloatArray = NDArray[np.float64]
 
@@ -244,9 +244,3 @@ def _counter_clockwise(points: FloatArray, triangles: NDArray[np.int32]) -> NDAr
     a, b, c = (points[triangles[:, i]] for i in range(3))
     area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     return np.where(area[:, None] < 0.0, triangles[:, ::-1], triangles)
-
-
-def plane_point(plane: Plane, st: Vec2) -> FloatArray:
-    """Return the world position (3,) of plane coordinates (s, t)."""
-    s, t = st
-    return np.array(plane.origin) + s * np.array(plane.u) + t * np.array(plane.v)

@@ -41,6 +41,7 @@ class Needs:
 
     @property
     def accumulates(self) -> bool:
+        """Whether each sample reads the mean of those before it."""
         return any(name == "radiance 2" for name, _ in self.attachments)
 
 

@@ -44,6 +44,7 @@ class ProgramSpec:
     def of(
         cls, name: str, vertex: str, fragment: str, features: Mapping[str, int] | None = None
     ) -> ProgramSpec:
+        """Return the spec with its features in one order, so that equal ones are equal."""
         return cls(name, vertex, fragment, tuple(sorted((features or {}).items())))
 
     def sources(self, roots: Sequence[Path]) -> tuple[Source, Source]:
