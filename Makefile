@@ -11,6 +11,7 @@ PYTEST := $(BIN)/python -m pytest -m "not slow" -q -n 2 --dist loadfile
 
 help:
 	@echo "make run     open the window; without a display, render the demo scenes into renders/"
+	@echo "make renders render the demo scenes in any case"
 	@echo "make test    run the tests (a few minutes)"
 	@echo "make check   ruff and mypy"
 	@echo "make clean   delete .venv, renders and caches"
@@ -22,20 +23,21 @@ $(STAMP): pyproject.toml .ci/setup.py
 	@touch $@
 
 run: $(STAMP)
-	@if [ "$$(uname)" = Darwin ] || [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ]; \
-	then $(BIN)/ltc-viewer; \
-	else $(MAKE) --no-print-directory renders; fi
+	@if [ "$$(uname)" = Darwin ] || [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ]; then \
+	    $(BIN)/ltc-viewer; \
+	else \
+	    echo "There is no display here (DISPLAY and WAYLAND_DISPLAY are empty), so the demo scenes"; \
+	    echo "are rendered to files. For the window run this on a desktop, or log in with ssh -X."; \
+	    $(MAKE) --no-print-directory renders; \
+	fi
 
 renders: $(STAMP)
 	@mkdir -p renders
 	@set -e; for scene in assets/scenes/*.json; do \
-	    picture=renders/$$(basename "$$scene" .json).png; \
-	    echo "$$picture"; \
-	    $(BIN)/ltc-viewer shot "$$scene" -o "$$picture" --samples 8 >/dev/null; \
+	    $(BIN)/ltc-viewer shot "$$scene" --samples 8 \
+	        -o "renders/$$(basename "$$scene" .json).png"; \
 	done
-	@echo "The demo scenes are in $(CURDIR)/renders. There is no display here (DISPLAY and"
-	@echo "WAYLAND_DISPLAY are empty); for the window type 'make run' on a desktop, or log in"
-	@echo "with 'ssh -X'."
+	@echo "The pictures are in $(CURDIR)/renders"
 
 test: $(STAMP)
 	@$(PYTEST) tests
