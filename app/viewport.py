@@ -36,7 +36,9 @@ from app.vectors import add, length, mix, scale, subtract
 SLOW = 0.045
 """Seconds for a full-size sample from which on moving pictures are smaller."""
 SETTLE = 0.2
-"""Seconds without movement after which a smaller picture becomes full-size."""
+"""Seconds without movement after which a smaller picture becomes full-size; more, up to
+`LONGEST_SETTLE`, where a full-size sample takes longer than that."""
+LONGEST_SETTLE = 1.0
 
 SMALLEST = 4
 """Most that width and height of a moving picture are divided by."""
@@ -146,6 +148,7 @@ class Viewport:
         self._shown: tuple[Scene, Camera, Scene] | None = None
         self._failed: Shot | None = None
         self._full_size_seconds = 0.0
+        self._divisor = 1
         self._hidden: frozenset[tuple[int, int]] = frozenset()
         self._unasked: list[tuple[tuple[int, int], Vec2]] = []
         self._is_asking = False
@@ -469,7 +472,8 @@ class Viewport:
         if self._wanted is None or _other_radiance(self._wanted, scene):
             self._changed_at = now
         self._wanted = scene
-        moving = now - self._changed_at < SETTLE
+        patience = min(max(SETTLE, self._full_size_seconds), LONGEST_SETTLE)
+        moving = now - self._changed_at < patience
         width, height = self.view.pixels
         divisor = 1
         if moving and self._full_size_seconds > SLOW:
@@ -499,7 +503,9 @@ class Viewport:
         timings = self._renderer.timings(wait=False)
         gpu = sum(value for name, value in timings.items() if name != "cpu") / 1e3
         self.history.append(1e3 * max(seconds, gpu))
-        self._full_size_seconds = max(seconds, gpu) * divisor**2
+        # The GPU's figures are those of the sample before, the size of which counts.
+        self._full_size_seconds = seconds + gpu * self._divisor**2
+        self._divisor = divisor
 
     def _picture(self) -> None:
         view, draw = self.view, imgui.get_window_draw_list()
