@@ -154,6 +154,7 @@ class Viewport:
         self._is_asking = False
         self._occlusion_of: tuple[Shot | None, int] | None = None
         self._hovered_light: int | None = None
+        self._asked: Hit | None = None
         self._changed_at = 0.0
 
     # --- the outside ----------------------------------------------------------
@@ -254,12 +255,14 @@ class Viewport:
                 self._navigate(editor, dx, dy)
         if hovered and io.mouse_wheel and not imgui.is_any_item_active():
             editor.look(control.dolly(editor.scene.camera, io.mouse_wheel))
-        if (
-            imgui.is_item_deactivated()
-            and self._moved <= io.mouse_drag_threshold
-            and imgui.is_mouse_released(imgui.MouseButton_.left)
-        ):
-            self._select(editor, io.mouse_pos.x, io.mouse_pos.y)
+        if imgui.is_item_deactivated() and self._moved <= io.mouse_drag_threshold:
+            if imgui.is_mouse_released(imgui.MouseButton_.left):
+                self._select(editor, io.mouse_pos.x, io.mouse_pos.y)
+            elif imgui.is_mouse_released(imgui.MouseButton_.right):
+                self._asked = self._hit(io.mouse_pos.x, io.mouse_pos.y)
+                if self._asked is not None:
+                    imgui.open_popup("place")
+        self._place_menu(editor)
         if hovered and imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             self._split_edge(editor, io.mouse_pos.x, io.mouse_pos.y)
         self._hover(editor.scene, hovered and not active)
@@ -299,6 +302,24 @@ class Viewport:
             editor.selection = Selection.light(hit.index)
         else:
             editor.selection = Selection.object(hit.index)
+
+    def _place_menu(self, editor: Editor) -> None:
+        """Offer what can be done with the place that was clicked with the right button."""
+        hit, light = self._asked, editor.selected_light
+        if hit is None or not imgui.begin_popup("place"):
+            return
+        if light is not None and imgui.menu_item_simple(f"Aim '{light.name}' here###aim here"):
+            try:
+                aimed = edits.aim(light, hit.position_ws)
+                scene = edits.replace_light(editor.scene, editor.selection.index, aimed)
+                editor.apply(f"Aim '{light.name}'", scene)
+            except SceneError as failure:
+                self._reporter.failure(str(failure))
+        if imgui.menu_item_simple("Look here"):
+            camera = editor.scene.camera
+            shift = subtract(hit.position_ws, camera.target)
+            editor.look(replace(camera, eye=add(camera.eye, shift), target=hit.position_ws))
+        imgui.end_popup()
 
     def _hover(self, scene: Scene, hovered: bool) -> None:
         io = imgui.get_io()

@@ -14,7 +14,7 @@ def help_line(scene: Scene, selection: Selection, tool: str) -> str:
     if not scene.lights:
         return "Add a light with + in the Scene panel"
     if selection.kind == "light" and selection.vertex is not None:
-        return "Drag the corner · Delete removes it · click a dot between corners to add one"
+        return "Drag the corner · Delete removes it · drag a dot between corners to add one"
     if selection.kind == "light":
         move = (
             "drag the arrows to move the light" if tool == "move" else "drag the rings to turn it"

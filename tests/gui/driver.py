@@ -280,6 +280,71 @@ def move_and_turn_with_the_gizmo(app: Application, out: Path) -> None:
     assert np.isclose(np.linalg.norm(turned.plane.u), 1.0)
 
 
+def aim_and_look_by_the_context_menu(app: Application, out: Path) -> None:
+    place = (0.6, 0.0, 0.9)
+    x, y = app.on_screen(place)
+
+    def menu(item: str) -> None:
+        def action(ctx) -> None:
+            ctx.mouse_move_to_pos(imgui.ImVec2(x, y))
+            ctx.yield_(2)
+            ctx.mouse_click(1)
+            ctx.item_click(f"//$FOCUSED/{item}")
+
+        app.act(action)
+
+    menu("###aim here")
+    light = app.scene.lights[0]
+    way = np.subtract(place, edits.centre_of(light))
+    facing = edits.normal_of(light.plane)
+    assert np.dot(way, facing) / np.linalg.norm(way) > 0.9999
+    assert app.window.editor.steps == ("Open", "Aim 'key'")
+    app.key(CTRL | imgui.Key.z)
+    menu("Look here")
+    assert np.allclose(app.scene.camera.target, place, atol=0.02)
+    assert app.scene.lights == SCENE.lights
+
+
+def every_panel_edits_the_scene(app: Application, out: Path) -> None:
+    """One step for each control, and undone all is as it was."""
+
+    def change(window: str, item: str, value: float | str) -> None:
+        steps = len(app.window.editor.steps)
+        app.act(lambda ctx: ctx.window_focus(f"//{window}"))
+        app.act(lambda ctx: ctx.item_input_value(f"//{window}/**/{item}", value))
+        assert len(app.window.editor.steps) == steps + 1, f"{window} {item}"
+
+    def press(window: str, item: str) -> None:
+        steps = len(app.window.editor.steps)
+        app.act(lambda ctx: ctx.window_focus(f"//{window}"))
+        app.act(lambda ctx: ctx.item_click(f"//{window}/**/{item}"))
+        assert len(app.window.editor.steps) == steps + 1, f"{window} {item}"
+
+    change("Light", "##radiance", 7.0)
+    assert max(app.scene.lights[0].radiance) == 7.0
+    change("Light", "##azimuth", 30.0)
+    change("Light", "##elevation", -20.0)
+    normal = edits.normal_of(app.scene.lights[0].plane)
+    assert np.isclose(np.degrees(np.arcsin(normal[1])), -20.0, atol=1e-3)
+    assert np.isclose(np.degrees(np.arctan2(normal[0], normal[2])), 30.0, atol=1e-3)
+    press("Light", "##two-sided")
+    press("Light", "Aim at centre")
+    press("Light", "Flip side")
+    change("Display", "##exposure", -1.5)
+    app.window.editor.selection = Selection.object(1)
+    app.frame()
+    press("Material", "Gold")
+    assert app.scene.materials[1].f0 == (1.0, 0.71, 0.29)
+    change("Material", "##name", "brass")
+    assert app.scene.objects[1].material == "brass"
+    change("Object", "##name", "orb")
+    steps = len(app.window.editor.steps) - 1
+    app.act(lambda ctx: ctx.window_focus("//Material"))
+    for _ in range(steps):
+        app.key(CTRL | imgui.Key.z)
+    assert app.scene == SCENE
+
+
 def save_reload_compare(app: Application, out: Path) -> None:
     path = out / "saved.json"
     app.drag("vertex 0.2", 30.0, -20.0)
@@ -466,6 +531,8 @@ SCENARIOS = (
     select_by_clicking,
     look_around,
     move_and_turn_with_the_gizmo,
+    aim_and_look_by_the_context_menu,
+    every_panel_edits_the_scene,
     save_reload_compare,
     save_and_open_by_the_dialog,
     same_picture_as_headless,
