@@ -66,6 +66,9 @@ class Mesh:
         Counter-clockwise seen from outside.
     bounds : (2, 3) float32, read-only
         The lowest and the highest corner of the box around ``positions``.
+    is_closed : bool
+        Every edge joins two triangles that face out: from outside, nobody sees a
+        back face.
     """
 
     positions: NDArray[np.float32]
@@ -73,6 +76,7 @@ class Mesh:
     tangents: NDArray[np.float32]
     indices: NDArray[np.uint32]
     bounds: NDArray[np.float32]
+    is_closed: bool
 
 
 def load_mesh(name_or_path: str) -> Mesh:
@@ -198,10 +202,30 @@ def _mesh(
         tangents=np.ascontiguousarray(tangents, dtype=np.float32),
         indices=np.ascontiguousarray(indices, dtype=np.uint32),
         bounds=np.stack((rounded.min(axis=0), rounded.max(axis=0))),
+        is_closed=_is_closed(positions, indices),
     )
     for array in (mesh.positions, mesh.normals, mesh.tangents, mesh.indices, mesh.bounds):
         array.setflags(write=False)
     return mesh
+
+
+def _is_closed(positions: FloatArray, indices: IntArray) -> bool:
+    """Return whether triangles bound a volume and face out of it.
+
+    Corners within a millionth of the mesh's size count as one: normals and seams
+    split vertices.
+    """
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    grid = np.rint((positions - low) / (1e-6 * max(float((high - low).max()), 1e-30)))
+    _, corner = np.unique(grid, axis=0, return_inverse=True)
+    triangles = corner.reshape(-1)[indices]
+    a, b = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
+    count = len(positions)
+    edges, times = np.unique(a * count + b, return_counts=True)
+    if np.any(times > 1) or not np.array_equal(edges, np.unique(b * count + a)):
+        return False
+    p, q, r = (positions[indices[:, i]] for i in range(3))
+    return bool(np.sum(p * np.cross(q, r)) > 0.0)
 
 
 # Files

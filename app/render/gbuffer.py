@@ -85,7 +85,14 @@ class _Instance:
     mesh: str
     world_from_object: NDArray[np.float64]
     normal: NDArray[np.float64]
-    front_sign: float
+    mirrors: bool
+
+
+def _is_outside(eye: NDArray[np.float64], instance: _Instance, mesh: Mesh) -> bool:
+    """Return whether the eye is outside the box around an object's mesh."""
+    low, high = mesh.bounds.astype(np.float64)
+    local = np.linalg.solve(instance.world_from_object, np.append(eye, 1.0))[:3]
+    return bool(np.any(local < low) or np.any(local > high))
 
 
 class GBufferPass:
@@ -119,8 +126,8 @@ class GBufferPass:
                     f"expected numbers below {LARGEST_NUMBER:g}"
                 )
             normal = normal_from_object(matrix)
-            mirrors = np.linalg.det(matrix[:3, :3]) < 0.0
-            instances.append(_Instance(item.mesh, matrix, normal, -1.0 if mirrors else 1.0))
+            mirrors = bool(np.linalg.det(matrix[:3, :3]) < 0.0)
+            instances.append(_Instance(item.mesh, matrix, normal, mirrors))
         for name in list(self._meshes):
             if self._meshes[name][0] is not meshes.get(name):
                 self._meshes.pop(name)[1].release()
@@ -165,9 +172,17 @@ class GBufferPass:
                 clip_from_object = clip_from_world @ instance.world_from_object
                 write_uniform(program, "clip_from_object", clip_from_object)
                 write_uniform(program, "world_from_object_normal", instance.normal)
-                set_uniform(program, "front_sign", instance.front_sign)
+                ctx.front_face = "cw" if instance.mirrors else "ccw"
                 set_uniform(program, "object_id", float(index))
-                self._meshes[instance.mesh][1].array(program).render()
+                mesh, vertices = self._meshes[instance.mesh]
+                # At a silhouette a sample may hit the far side by a rounding, whose normal,
+                # turned to the viewer, reflects what is behind the object.
+                if mesh.is_closed and _is_outside(frame.eye, instance, mesh):
+                    ctx.enable(moderngl.CULL_FACE)
+                else:
+                    ctx.disable(moderngl.CULL_FACE)
+                vertices.array(program).render()
+            ctx.front_face = "ccw"
         if self._shapes is not None:
             program = self._programs.get(LIGHTS)
             set_uniform(program, "clip_window", window)

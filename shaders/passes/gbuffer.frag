@@ -7,13 +7,12 @@
 in vec3 normal_ws;
 
 uniform float object_id;
-uniform float front_sign;  // -1 where the transform mirrors, else 1
 
 layout(location = 0) out vec4 surface;
 
 void main()
 {
-    float side = gl_FrontFacing ? front_sign : -front_sign;
+    float side = gl_FrontFacing ? 1.0 : -1.0;
     float depth = 1.0 / gl_FragCoord.w;
     surface = vec4(octahedral_from_direction(normal_ws * side), depth, object_id);
     gl_FragDepth = log_depth(depth);
