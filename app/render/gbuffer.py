@@ -84,6 +84,7 @@ class _Vertices:
 class _Instance:
     mesh: str
     world_from_object: NDArray[np.float64]
+    object_from_world: NDArray[np.float64]
     normal: NDArray[np.float64]
     mirrors: bool
 
@@ -91,7 +92,7 @@ class _Instance:
 def _is_outside(eye: NDArray[np.float64], instance: _Instance, mesh: Mesh) -> bool:
     """Return whether the eye is outside the box around an object's mesh."""
     low, high = mesh.bounds.astype(np.float64)
-    local = np.linalg.solve(instance.world_from_object, np.append(eye, 1.0))[:3]
+    local = instance.object_from_world[:3, :3] @ eye + instance.object_from_world[:3, 3]
     return bool(np.any(local < low) or np.any(local > high))
 
 
@@ -127,7 +128,8 @@ class GBufferPass:
                 )
             normal = normal_from_object(matrix)
             mirrors = bool(np.linalg.det(matrix[:3, :3]) < 0.0)
-            instances.append(_Instance(item.mesh, matrix, normal, mirrors))
+            inverse = np.linalg.inv(matrix)
+            instances.append(_Instance(item.mesh, matrix, inverse, normal, mirrors))
         for name in list(self._meshes):
             if self._meshes[name][0] is not meshes.get(name):
                 self._meshes.pop(name)[1].release()

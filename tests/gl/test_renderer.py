@@ -13,6 +13,7 @@ import pytest
 
 from app.errors import InputError
 from app.render.assemble import ShaderError
+from app.render.camera import CameraFrame
 from app.render.features import LightingFeatures, Limits
 from app.render.programs import Programs, ProgramSpec, shader_roots
 from app.render.renderer import Renderer
@@ -645,8 +646,6 @@ def test_probe_is_what_the_picture_shows(renderer: Renderer) -> None:
         surfaces = renderer._targets.texture("gbuffer")
         depth = np.frombuffer(surfaces.read(), dtype=np.float32).reshape(36, 64, 4)[::-1, :, 2]
         rows, columns = np.nonzero(depth > 0.0)
-        from app.render.camera import CameraFrame
-
         frame = CameraFrame.of(scene.camera, 64 / 36)
         ray = frame.ray(columns + 0.5, rows + 0.5, (64, 36))
         position = frame.eye + depth[rows, columns, None].astype(np.float64) * ray
