@@ -128,7 +128,7 @@ class GBufferPass:
                 )
             normal = normal_from_object(matrix)
             mirrors = bool(np.linalg.det(matrix[:3, :3]) < 0.0)
-            inverse = np.linalg.inv(matrix)
+            inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
             instances.append(_Instance(item.mesh, matrix, inverse, normal, mirrors))
         for name in list(self._meshes):
             if self._meshes[name][0] is not meshes.get(name):
