@@ -17,8 +17,14 @@ from numpy.typing import NDArray
 from app.scene import Camera, Vec3
 from app.vectors import add, cross, dot, length, normalize, rotate, scale, subtract
 
+FloatArray = NDArray[np.float64]
+
 POLE_MARGIN = math.radians(1.0)
 """Smallest angle left between the view and ``up`` or its opposite [rad]."""
+
+LEAST_ASPECT = 16.0 / 9.0
+WIDEST = math.radians(150.0)
+"""Most that `widened` opens the field of view [rad]."""
 
 DISTANCE_MIN, DISTANCE_MAX = 1e-3, 1e5
 NEAR = 1e-3
@@ -107,6 +113,18 @@ def frame(camera: Camera, centre: Vec3, radius: float, aspect: float) -> Camera:
     return replace(camera, eye=add(centre, offset), target=centre)
 
 
+def widened(camera: Camera, aspect: float) -> Camera:
+    """Return the camera with a field of view that shows the width of a `LEAST_ASPECT` picture.
+
+    Scenes are composed for wide pictures; a narrow one shows more above and
+    below instead of cutting off the sides.
+    """
+    if aspect >= LEAST_ASPECT:
+        return camera
+    half = math.atan(math.tan(camera.fov_y / 2.0) * LEAST_ASPECT / aspect)
+    return replace(camera, fov_y=min(2.0 * half, WIDEST))
+
+
 def project(camera: Camera, point: Vec3, width: float, height: float) -> Vec3 | None:
     """Return (x, y) in pixels and the depth [m] of a point; None if not in front of the eye."""
     axes = basis_of(camera)
@@ -118,6 +136,21 @@ def project(camera: Camera, point: Vec3, width: float, height: float) -> Vec3 | 
     x = 0.5 * width + focal * dot(offset, axes.right) / depth
     y = 0.5 * height - focal * dot(offset, axes.up) / depth
     return (x, y, depth)
+
+
+def project_all(
+    camera: Camera, points: FloatArray, width: float, height: float
+) -> FloatArray | None:
+    """Return (n, 2) pixels of (n, 3) points; None if one of them is not in front of the eye."""
+    axes = basis_of(camera)
+    local = (points - np.array(camera.eye)) @ np.array([axes.right, axes.up, axes.forward]).T
+    depth = local[:, 2]
+    if (depth < NEAR).any():
+        return None
+    focal = 0.5 * height / math.tan(camera.fov_y / 2.0)
+    x = 0.5 * width + focal * local[:, 0] / depth
+    y = 0.5 * height - focal * local[:, 1] / depth
+    return np.stack([x, y], axis=-1)
 
 
 def clip_to_view(camera: Camera, a: Vec3, b: Vec3) -> tuple[Vec3, Vec3] | None:
@@ -157,7 +190,7 @@ def intersect_plane(origin: Vec3, direction: Vec3, point: Vec3, normal: Vec3) ->
     return add(origin, scale(direction, distance)) if distance > 0.0 else None
 
 
-def view_from_world(camera: Camera) -> NDArray[np.float64]:
+def view_from_world(camera: Camera) -> FloatArray:
     """Return the (4, 4) view matrix, looking along -z (OpenGL's convention)."""
     axes = basis_of(camera)
     matrix = np.eye(4)
@@ -167,7 +200,7 @@ def view_from_world(camera: Camera) -> NDArray[np.float64]:
     return matrix
 
 
-def clip_from_view(camera: Camera, aspect: float) -> NDArray[np.float64]:
+def clip_from_view(camera: Camera, aspect: float) -> FloatArray:
     """Return the (4, 4) perspective projection (OpenGL's clip space), near 1 cm, far 1 km."""
     near, far = 0.01, 1000.0
     focal = 1.0 / math.tan(camera.fov_y / 2.0)

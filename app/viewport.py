@@ -11,6 +11,7 @@ the wanted number, and then no pass runs at all.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 import traceback
@@ -20,18 +21,18 @@ from typing import Protocol
 
 import moderngl
 import numpy as np
-from imgui_bundle import ImVec2, ImVec4, imgui
+from imgui_bundle import ImVec2, imgui
 from imgui_bundle.imguizmo import im_guizmo as gizmo
 
 from app import camera_control as control
 from app import edits, theme
 from app.editor import NOTHING, Editor, Selection
 from app.errors import InputError
-from app.meshes import load_mesh
-from app.render.camera import world_from_object
+from app.overlays import HANDLE, Canvas, View, help_line, is_near, middles_of
+from app.placement import box_corners, moved_by, name_of, pose_of, sphere_around
 from app.render.renderer import Hit, Renderer
-from app.scene import AreaLight, Camera, RenderSettings, Scene, SceneError, Shot, Vec2, Vec3
-from app.vectors import add, length, mix, scale, subtract
+from app.scene import AreaLight, Camera, RenderSettings, Scene, SceneError, Shot, Vec2
+from app.vectors import add, length, mix, subtract
 
 SLOW = 0.045
 """Seconds for a full-size sample from which on moving pictures are smaller."""
@@ -42,15 +43,9 @@ LONGEST_SETTLE = 1.0
 
 SMALLEST = 4
 """Most that width and height of a moving picture are divided by."""
-LEAST_ASPECT = 16.0 / 9.0
-WIDEST = math.radians(150.0)
 UNDER_STATUS_BAR = 1
 """Points by which hello_imgui's status bar covers the docked windows."""
 
-HANDLE = 9.0
-"""Half the side of the square in which a corner can be grabbed, in points."""
-SHORTEST_EDGE = 56.0
-"""Length in points from which on an edge offers a point to add a corner."""
 MOST_HANDLES = 400
 """Corners beyond this number get no handles: they would hide the light."""
 MOST_ASKED = 64
@@ -63,18 +58,6 @@ class Reporter(Protocol):
     """Where sentences for the user go."""
 
     def failure(self, text: str) -> None: ...
-
-
-def widened(camera: Camera, aspect: float) -> Camera:
-    """Return the camera with a field of view that shows the width of a `LEAST_ASPECT` picture.
-
-    Scenes are composed for wide pictures; a narrow window shows more above and
-    below instead of cutting off the sides.
-    """
-    if aspect >= LEAST_ASPECT:
-        return camera
-    half = math.atan(math.tan(camera.fov_y / 2.0) * LEAST_ASPECT / aspect)
-    return replace(camera, fov_y=min(2.0 * half, WIDEST))
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,29 +76,6 @@ class GizmoDrag:
     scene: Scene
     selection: Selection
     matrix: np.ndarray
-
-
-@dataclass(frozen=True, slots=True)
-class View:
-    """The picture's place on the screen: corner and size in points, size in pixels."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-    pixels: tuple[int, int]
-
-    def project(self, camera: Camera, point: Vec3) -> tuple[float, float] | None:
-        """Return screen coordinates of a world point, None behind the eye."""
-        found = control.project(camera, point, self.width, self.height)
-        return None if found is None else (self.x + found[0], self.y + found[1])
-
-    def ray(self, camera: Camera, x: float, y: float) -> Vec3:
-        """Return the direction of the ray through screen coordinates."""
-        return control.ray_through(camera, x - self.x, y - self.y, self.width, self.height)
-
-    def contains(self, x: float, y: float) -> bool:
-        return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
 
 
 class Viewport:
@@ -188,15 +148,11 @@ class Viewport:
 
     def frame(self, editor: Editor) -> None:
         """Turn the camera's attention to what is selected, or to the whole scene."""
-        spheres = list(_spheres(editor.scene, editor.selection))
-        if not spheres:
+        sphere = sphere_around(editor.scene, editor.selection)
+        if sphere is None:
             return
-        low = np.min([np.array(centre) - radius for centre, radius in spheres], axis=0)
-        high = np.max([np.array(centre) + radius for centre, radius in spheres], axis=0)
-        x, y, z = ((low + high) / 2.0).tolist()
-        radius = spheres[0][1] if len(spheres) == 1 else float(np.linalg.norm(high - low)) / 2.0
-        aspect = max(self.view.width / self.view.height, LEAST_ASPECT)
-        editor.look(control.frame(editor.scene.camera, (x, y, z), radius, aspect))
+        aspect = max(self.view.width / self.view.height, control.LEAST_ASPECT)
+        editor.look(control.frame(editor.scene.camera, *sphere, aspect))
 
     def draw(self, editor: Editor, settings: RenderSettings) -> None:
         """Draw one frame into the current Dear ImGui window."""
@@ -210,11 +166,11 @@ class Viewport:
         if self.show_overlays:
             self._overlays(editor)
             self._manipulate(editor)
-            self._help_line()
+            help_line(self.view, self.help)
 
     def camera_of(self, scene: Scene) -> Camera:
         """Return the camera that the picture is seen with."""
-        return widened(scene.camera, self.view.width / self.view.height)
+        return control.widened(scene.camera, self.view.width / self.view.height)
 
     # --- where -----------------------------------------------------------------
 
@@ -349,15 +305,14 @@ class Viewport:
                 self._begin_corner(editor, f"Move corner of '{light.name}'", vertex, at)
             if at is not None:
                 self._corner_menu(editor, index, vertex)
-        for contour, edge, at, long_enough in _edge_middles(self.view, camera, light):
-            name = f"edge {contour}.{edge}"
-            grabbed = self._corner is not None and self._corner.vertex == (contour, edge + 1)
-            if (long_enough or grabbed) and self._handle(name, at):
-                vertex = (contour, edge + 1)
-                wider = edits.add_vertex(light, contour, edge)
-                scene = edits.replace_light(editor.scene, index, wider)
-                self._begin_corner(editor, f"Add corner to '{light.name}'", vertex, at)
-                editor.update(scene)
+        for middle in middles_of(self.view, camera, light):
+            vertex = (middle.contour, middle.edge + 1)
+            grabbed = self._corner is not None and self._corner.vertex == vertex
+            name = f"edge {middle.contour}.{middle.edge}"
+            if (middle.has_room or grabbed) and self._handle(name, middle.at):
+                wider = edits.add_vertex(light, middle.contour, middle.edge)
+                self._begin_corner(editor, f"Add corner to '{light.name}'", vertex, middle.at)
+                editor.update(edits.replace_light(editor.scene, index, wider))
                 editor.selection = Selection.light(index, vertex)
                 break
         self._drag_corner(editor)
@@ -461,8 +416,8 @@ class Viewport:
         view, camera = self.view, self.camera_of(scene)
         gizmo.set_drawlist()
         gizmo.set_rect(view.x, view.y, view.width, view.height)
-        start = _pose(scene, selection) if self._gizmo is None else None
-        matrix = gizmo.Matrix16(_columns(_pose(scene, selection)))
+        start = pose_of(scene, selection) if self._gizmo is None else None
+        matrix = gizmo.Matrix16(_columns(pose_of(scene, selection)))
         changed = gizmo.manipulate(
             gizmo.Matrix16(_columns(control.view_from_world(camera))),
             gizmo.Matrix16(_columns(control.clip_from_view(camera, view.width / view.height))),
@@ -475,14 +430,14 @@ class Viewport:
             self._gizmo = None
             return
         if self._gizmo is None and start is not None:
-            name = _name_of(scene, selection)
+            name = name_of(scene, selection)
             editor.begin(f"{'Move' if self.tool == 'move' else 'Rotate'} '{name}'")
             self._gizmo = GizmoDrag(scene, selection, start)
         drag = self._gizmo
         if changed and drag is not None and editor.is_dragging:
             pose = np.array(matrix.values, dtype=np.float64).reshape(4, 4).T
-            rigid = _rigid(pose @ np.linalg.inv(drag.matrix))
-            moved = _moved_by(drag.scene, drag.selection, rigid)
+            motion = pose @ np.linalg.inv(drag.matrix)
+            moved = moved_by(drag.scene, drag.selection, motion)
             editor.update(replace(moved, camera=scene.camera))
 
     # --- rendering -----------------------------------------------------------------
@@ -548,118 +503,44 @@ class Viewport:
     def _overlays(self, editor: Editor) -> None:
         scene, chosen = editor.scene, editor.selection
         camera = self.camera_of(scene)
-        draw, view = imgui.get_window_draw_list(), self.view
+        view, draw = self.view, imgui.get_window_draw_list()
+        canvas = Canvas(draw, view, camera, self._unit)
         high = ImVec2(view.x + view.width, view.y + view.height)
         draw.push_clip_rect(ImVec2(view.x, view.y), high, True)
         for index, light in enumerate(scene.lights):
-            selected = chosen.kind == "light" and chosen.index == index
-            if selected:
-                self._outline(draw, camera, light, theme.ACCENT, 1.0, 1.8)
+            if chosen.kind == "light" and chosen.index == index:
+                canvas.outline(light, theme.ACCENT, 1.0, 1.8)
+                canvas.direction(light)
+                self._corners(canvas, editor, light)
             elif index == self._hovered_light:
-                self._outline(draw, camera, light, theme.ACCENT, 0.55, 1.5)
+                canvas.outline(light, theme.ACCENT, 0.55, 1.5)
             elif not light.visible:
-                self._outline(draw, camera, light, theme.grey(0.9), 0.3, 1.0)
+                canvas.outline(light, theme.grey(0.9), 0.3, 1.0)
         if chosen.kind == "object":
-            self._box(draw, camera, scene, chosen.index)
-        active = editor.selected_light
-        if active is not None:
-            self._direction(draw, camera, active)
-            if len(edits.vertices_of(active)) <= MOST_HANDLES:
-                self._corners(draw, editor, active)
+            with contextlib.suppress(InputError):
+                canvas.box(box_corners(scene, chosen.index))
         draw.pop_clip_rect()
 
-    def _outline(
-        self,
-        draw: imgui.ImDrawList,
-        camera: Camera,
-        light: AreaLight,
-        colour: ImVec4,
-        alpha: float,
-        thickness: float,
-    ) -> None:
-        ink, shade = theme.u32(colour, alpha), theme.u32(theme.grey(0.0), 0.35 * alpha)
-        for contour in light.outline.contours:
-            points = [edits.point_on(light.plane, point) for point in contour.points]
-            for a, b in zip(points, points[1:] + points[:1], strict=True):
-                ends = self._segment(camera, a, b)
-                if ends is not None:
-                    draw.add_line(*ends, shade, thickness + 2.0)
-                    draw.add_line(*ends, ink, thickness)
-
-    def _box(self, draw: imgui.ImDrawList, camera: Camera, scene: Scene, index: int) -> None:
-        """Draw the edges of an object's bounding box."""
-        try:
-            corners = _box_corners(scene, index)
-        except InputError:
+    def _corners(self, canvas: Canvas, editor: Editor, light: AreaLight) -> None:
+        """Draw the handles of the selected light."""
+        vertices = edits.vertices_of(light)
+        if len(vertices) > MOST_HANDLES:
             return
-        for a in range(8):
-            for axis in (1, 2, 4):
-                if not a & axis:
-                    ends = self._segment(camera, corners[a], corners[a | axis])
-                    if ends is not None:
-                        draw.add_line(*ends, theme.u32(theme.ACCENT, 0.45), 1.0)
-
-    def _segment(self, camera: Camera, a: Vec3, b: Vec3) -> tuple[ImVec2, ImVec2] | None:
-        clipped = control.clip_to_view(camera, a, b)
-        if clipped is None:
-            return None
-        first, last = (self.view.project(camera, point) for point in clipped)
-        if first is None or last is None:
-            return None
-        return ImVec2(*first), ImVec2(*last)
-
-    def _direction(self, draw: imgui.ImDrawList, camera: Camera, light: AreaLight) -> None:
-        """Draw a short line from the light's centre to where it shines."""
-        centre, radius = edits.bounds_of(light)
-        tip = add(centre, scale(edits.normal_of(light.plane), 0.6 * radius))
-        ends = self._segment(camera, centre, tip)
-        if ends is not None:
-            draw.add_line(*ends, theme.u32(theme.ACCENT, 0.5), 1.5)
-            draw.add_circle_filled(ends[1], 3.0, theme.u32(theme.ACCENT, 0.8))
-
-    def _corners(self, draw: imgui.ImDrawList, editor: Editor, light: AreaLight) -> None:
-        camera, mouse = self.camera_of(editor.scene), imgui.get_io().mouse_pos
         if self.is_settled:
             self._find_hidden(editor.scene, editor.selection.index)
-        for _, _, at, long_enough in _edge_middles(self.view, camera, light):
-            if long_enough:
-                self._middle(draw, at, _is_near(at, mouse, self._unit))
-        for vertex, point in edits.vertices_of(light):
-            at_corner = self.view.project(camera, edits.point_on(light.plane, point))
-            if at_corner is not None:
-                near = _is_near(at_corner, mouse, self._unit)
-                chosen = editor.selection.vertex == vertex
-                dim = vertex in self._hidden and not (near or chosen)
-                self._dot(draw, at_corner, near, chosen, 0.4 if dim else 1.0)
-
-    def _middle(self, draw: imgui.ImDrawList, at: tuple[float, float], near: bool) -> None:
-        """Draw the dot that adds a corner, a plus under the pointer."""
-        radius, alpha = (5.0, 1.0) if near else (2.5, 0.6)
-        radius *= self._unit
-        centre, arm = ImVec2(*at), 3.0 * self._unit
-        draw.add_circle_filled(centre, radius + 1.0, theme.u32(theme.grey(0.0), 0.5))
-        draw.add_circle_filled(centre, radius, theme.u32(theme.grey(0.95), alpha))
-        if near:
-            ink = theme.u32(theme.grey(0.1))
-            draw.add_line(ImVec2(at[0] - arm, at[1]), ImVec2(at[0] + arm, at[1]), ink, 1.5)
-            draw.add_line(ImVec2(at[0], at[1] - arm), ImVec2(at[0], at[1] + arm), ink, 1.5)
-
-    def _dot(
-        self,
-        draw: imgui.ImDrawList,
-        at: tuple[float, float],
-        near: bool,
-        chosen: bool,
-        alpha: float,
-    ) -> None:
-        """Draw a corner: larger under the pointer, ringed when selected."""
-        centre = ImVec2(*at)
-        radius = self._unit * (6.5 if near or chosen else 5.0)
-        fill = theme.ACCENT if chosen or near else theme.grey(0.97)
-        draw.add_circle_filled(centre, radius + 1.5, theme.u32(theme.grey(0.0), 0.6 * alpha))
-        draw.add_circle_filled(centre, radius, theme.u32(fill, alpha))
-        if chosen:
-            draw.add_circle(centre, radius + 3.0, theme.u32(theme.ACCENT), 0, 1.5)
+        mouse = imgui.get_io().mouse_pos
+        for middle in middles_of(self.view, canvas.camera, light):
+            if middle.has_room:
+                canvas.middle(middle.at, near=is_near(middle.at, mouse, self._unit))
+        for vertex, point in vertices:
+            at = self.view.project(canvas.camera, edits.point_on(light.plane, point))
+            if at is not None:
+                canvas.corner(
+                    at,
+                    near=is_near(at, mouse, self._unit),
+                    chosen=editor.selection.vertex == vertex,
+                    hidden=vertex in self._hidden,
+                )
 
     def _find_hidden(self, scene: Scene, index: int) -> None:
         """Find out, a few at a time once nothing moves, which corners are behind something."""
@@ -682,20 +563,6 @@ class Viewport:
             self._hidden = self._hidden | {vertex} if behind else self._hidden - {vertex}
         self._is_asking = bool(self._unasked)
 
-    def _help_line(self) -> None:
-        """Write the help over the lower edge of the picture."""
-        if not self.help:
-            return
-        view, draw = self.view, imgui.get_window_draw_list()
-        size, pad = imgui.calc_text_size(self.help), 0.7 * imgui.get_font_size()
-        if size.x + 4.0 * pad > view.width:
-            return
-        x = view.x + 0.5 * (view.width - size.x)
-        y = view.y + view.height - size.y - 2.0 * pad
-        low, high = ImVec2(x - pad, y - 0.5 * pad), ImVec2(x + size.x + pad, y + size.y + 0.5 * pad)
-        draw.add_rect_filled(low, high, theme.u32(theme.grey(0.06), 0.72), 6.0)
-        draw.add_text(ImVec2(x, y), theme.u32(theme.grey(0.86)), self.help)
-
 
 def _other_radiance(a: Scene, b: Scene) -> bool:
     """Tell whether two scenes may differ in more than exposure and tone map."""
@@ -711,105 +578,6 @@ def _remove_outline(light: AreaLight, vertex: tuple[int, int]) -> AreaLight:
     return edits.remove_contour(light, vertex[0])
 
 
-def _edge_middles(
-    view: View, camera: Camera, light: AreaLight
-) -> list[tuple[int, int, tuple[float, float], bool]]:
-    """Return (contour, edge, middle on the screen, whether there is room for a handle)."""
-    found = []
-    for c, contour in enumerate(light.outline.contours):
-        world = [edits.point_on(light.plane, point) for point in contour.points]
-        for e, (a, b) in enumerate(zip(world, world[1:] + world[:1], strict=True)):
-            first, last = view.project(camera, a), view.project(camera, b)
-            middle = view.project(camera, scale(add(a, b), 0.5))
-            if first is not None and last is not None and middle is not None:
-                span = np.hypot(last[0] - first[0], last[1] - first[1])
-                found.append((c, e, middle, bool(span >= SHORTEST_EDGE)))
-    return found
-
-
-def _is_near(at: tuple[float, float], mouse: ImVec2, unit: float) -> bool:
-    """Tell whether the pointer is where a handle can be grabbed."""
-    return max(abs(at[0] - mouse.x), abs(at[1] - mouse.y)) <= unit * HANDLE
-
-
 def _columns(matrix: np.ndarray) -> list[float]:
     """Return the 16 numbers of a matrix column by column, as ImGuizmo takes them."""
     return [float(value) for value in matrix.T.reshape(-1)]
-
-
-def _pose(scene: Scene, selection: Selection) -> np.ndarray:
-    """Return the (4, 4) rotation and translation of what is selected; a light's z is its normal."""
-    pose = np.eye(4)
-    if selection.kind == "light":
-        light = scene.lights[selection.index]
-        normal = np.array(edits.normal_of(light.plane))
-        u = np.array(light.plane.u) / length(light.plane.u)
-        pose[:3, :3] = np.stack([u, np.cross(normal, u), normal], axis=1)
-        pose[:3, 3] = edits.centre_of(light)
-        return pose
-    transform = scene.objects[selection.index].transform
-    pose[:] = world_from_object(replace(transform, scale=(1.0, 1.0, 1.0)))
-    return pose
-
-
-def _rigid(matrix: np.ndarray) -> np.ndarray:
-    """Return the nearest rotation and translation to a nearly rigid (4, 4) matrix."""
-    left, _, right = np.linalg.svd(matrix[:3, :3])
-    rigid = matrix.copy()
-    rigid[:3, :3] = left @ right
-    return rigid
-
-
-def _moved_by(scene: Scene, selection: Selection, rigid: np.ndarray) -> Scene:
-    if selection.kind == "light":
-        light = scene.lights[selection.index]
-        plane = edits.transform_plane(light.plane, rigid)
-        return edits.replace_light(scene, selection.index, replace(light, plane=plane))
-    item = edits.transform_object(scene.objects[selection.index], rigid)
-    return edits.replace_object(scene, selection.index, item)
-
-
-def _name_of(scene: Scene, selection: Selection) -> str:
-    items = scene.lights if selection.kind == "light" else scene.objects
-    return items[selection.index].name
-
-
-def _spheres(scene: Scene, selection: Selection) -> list[tuple[Vec3, float]]:
-    """Return bounding spheres of what is selected, or of all but the planes if nothing is."""
-    if selection.kind == "light":
-        return [edits.bounds_of(scene.lights[selection.index])]
-    if selection.kind == "object":
-        return [_object_sphere(scene, selection.index)]
-    spheres = [edits.bounds_of(light) for light in scene.lights]
-    spheres += [
-        _object_sphere(scene, index)
-        for index, item in enumerate(scene.objects)
-        if item.mesh != "plane"
-    ]
-    return spheres
-
-
-def _object_sphere(scene: Scene, index: int) -> tuple[Vec3, float]:
-    world = np.array(_box_corners(scene, index))
-    centre = (world.max(0) + world.min(0)) / 2.0
-    x, y, z = centre.tolist()
-    return (x, y, z), float(np.linalg.norm(world - centre, axis=-1).max())
-
-
-def _box_corners(scene: Scene, index: int) -> list[Vec3]:
-    """Return the world corners of an object's box; bits 1, 2, 4 of the index choose x, y, z.
-
-    Raises
-    ------
-    InputError
-        If the mesh cannot be loaded.
-    """
-    item = scene.objects[index]
-    bounds = np.asarray(load_mesh(item.mesh).bounds, dtype=np.float64)
-    matrix = world_from_object(item.transform)
-    corners: list[Vec3] = []
-    for i in range(8):
-        point = np.array([bounds[i & 1, 0], bounds[i >> 1 & 1, 1], bounds[i >> 2 & 1, 2]])
-        x, y, z = (matrix[:3, :3] @ point + matrix[:3, 3]).tolist()
-        corners.append((x, y, z))
-    return corners

@@ -100,6 +100,23 @@ def test_projection_agrees_with_the_matrices() -> None:
         assert -1.0 < z / w < 1.0
 
 
+def test_projecting_many_points_is_projecting_each() -> None:
+    points = np.random.default_rng(5).uniform(-1.0, 1.0, (20, 3))
+    each = [control.project(CAMERA, tuple(point), W, H)[:2] for point in points]
+    assert control.project_all(CAMERA, points, W, H) == pytest.approx(np.array(each))
+    points[7] = CAMERA.eye
+    assert control.project_all(CAMERA, points, W, H) is None
+
+
+@pytest.mark.parametrize("aspect", [0.3, 1.0, 1.7])
+def test_a_widened_camera_shows_the_width_of_a_wide_picture(aspect: float) -> None:
+    wide = control.widened(CAMERA, aspect)
+    across = math.tan(wide.fov_y / 2.0) * aspect
+    wanted = math.tan(CAMERA.fov_y / 2.0) * control.LEAST_ASPECT
+    assert across == pytest.approx(wanted) or wide.fov_y == control.WIDEST
+    assert control.widened(CAMERA, control.LEAST_ASPECT) is CAMERA
+
+
 def test_nothing_behind_the_eye_is_projected() -> None:
     behind = subtract(CAMERA.eye, control.basis_of(CAMERA).forward)
     assert control.project(CAMERA, behind, W, H) is None

@@ -18,7 +18,10 @@ PURE = {
     "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.errors", "app.files",
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
 }  # fmt: skip
-WINDOW = {"app.window", "app.viewport", "app.dialogs", "app.messages", "app.theme"}
+WINDOW = {
+    "app.window", "app.viewport", "app.overlays", "app.placement", "app.dialogs", "app.messages",
+    "app.theme",
+}  # fmt: skip
 
 
 def modules() -> dict[str, Path]:
