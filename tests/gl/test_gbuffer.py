@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
+import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from app.meshes import load_mesh
-from app.render.camera import CameraFrame, world_from_object
+from app.render.camera import FAR, NEAR, CameraFrame, world_from_object
 from app.render.renderer import Hit, Renderer
 from app.scene import (
     AreaLight,
@@ -22,6 +24,7 @@ from app.scene import (
     Shot,
     Transform,
 )
+from tests.gl.evaluate import evaluate
 from tests.gl.scenes import FRAME, GLOSSY, KEY, SQUARE, ball, floor, one_light
 
 SIZE = (160, 90)
@@ -254,3 +257,34 @@ def test_pick_without_lights(renderer: Renderer) -> None:
     hit = renderer.pick(80.0, 80.0)
     assert hit is not None
     assert hit.kind == "object"
+
+
+def test_octahedral_round_trip(ctx: moderngl.Context, tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    direction = rng.normal(size=(4000, 3))
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    direction = np.concatenate(
+        [direction, axes, axes @ np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])]
+    )
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    body = """
+        vec2 p = octahedral_from_direction(3.0 * direction);
+        result = vec4(direction_from_octahedral(p), max(abs(p.x), abs(p.y)));
+    """
+    got = evaluate(ctx, tmp_path, ["common/octahedron.glsl"], body, {"direction": direction})
+    assert np.abs(got[:, :3] - direction).max() < 4e-7
+    assert got[:, 3].max() <= 1.0
+    nothing = evaluate(
+        ctx, tmp_path, ["common/octahedron.glsl"], body, {"direction": np.zeros((1, 3))}
+    )
+    np.testing.assert_array_equal(nothing[0, :3], [0.0, 0.0, 1.0])
+
+
+def test_depth_is_logarithmic(ctx: moderngl.Context, tmp_path: Path) -> None:
+    depth = np.geomspace(0.5 * NEAR, 2.0 * FAR, 999)
+    got = evaluate(
+        ctx, tmp_path, ["common/depth.glsl"], "result.x = log_depth(depth);", {"depth": depth}
+    )[:, 0]
+    expected = np.clip(np.log(depth / NEAR) / np.log(FAR / NEAR), 0.0, 1.0)
+    np.testing.assert_allclose(got, expected, atol=2e-7)
+    assert (np.diff(got) >= 0.0).all()
