@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import subprocess
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from app.cli.main import run
-from app.scene_io import demo_scenes, scene_from_json
+from app.scene_io import demo_scenes, scene_from_json, scene_to_json
 from ltc.__main__ import main as ltc_main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -94,6 +95,23 @@ def test_explain_as_in_the_readme() -> None:
 )
 def test_json_loads(page: Path, text: str) -> None:
     scene_from_json(text, None, page.name)
+
+
+def test_documented_defaults_are_the_real_ones() -> None:
+    """Every row of docs/scene-file.md whose default is a JSON value."""
+    parts = {"camera": {}, "materials": {"m": {}}, "objects": [{}], "lights": [{}], "display": {}}
+    text = json.dumps({"format": "ltc-scene/1", **parts})
+    written = json.loads(scene_to_json(scene_from_json(text, None, "text"), None))
+    page = (ROOT / "docs" / "scene-file.md").read_text("utf-8")
+    checked = 0
+    for section in re.split(r"^## ", page, flags=re.MULTILINE)[1:]:
+        name = section.split("`")[1]
+        part = written[name]
+        part = part[0] if isinstance(part, list) else part.get("m", part)
+        for key, default in re.findall(r"^\| `(\w+)` \| `([^`]+)` \|", section, re.MULTILINE):
+            assert part[key] == json.loads(default), f"{name}.{key}"
+            checked += 1
+    assert checked >= 14
 
 
 def test_make_targets_exist() -> None:
