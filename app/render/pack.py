@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InputError
 from app.outline import resolve, triangulate
+from app.render.caching import ByteCache
 from app.scene import AreaLight, Material, Plane
 
 FloatArray = NDArray[np.float64]
@@ -66,7 +66,8 @@ TEXELS_PER_MATERIAL = MATERIAL_RECORD.itemsize // 16
 TEXELS_PER_EDGE = 2
 MAX_INDEX = 2**24
 """Texel indices are stored as float32."""
-CACHED_LIGHTS = 4096
+CACHED_BYTES = 16 * 2**20
+"""Of each of the three things that are kept of every light."""
 LARGEST_NUMBER = 1e12
 """Lengths [m] and radiance from here on would overflow float32 in products of three."""
 
@@ -106,7 +107,6 @@ def plane_basis(plane: Plane) -> tuple[FloatArray, FloatArray, FloatArray]:
     return e1, e2, np.array([[length, v @ e1], [0.0, v @ e2]])
 
 
-@lru_cache(maxsize=CACHED_LIGHTS)
 def light_geometry(light: AreaLight) -> LightGeometry:
     """Return a light's geometry; one whose outline is empty has no edges.
 
@@ -115,6 +115,10 @@ def light_geometry(light: AreaLight) -> LightGeometry:
     InputError
         If its lengths or radiance do not fit into float32.
     """
+    return _geometries(light)
+
+
+def _checked_geometry(light: AreaLight) -> LightGeometry:
     geometry = _light_geometry(light)
     largest = max(float(np.abs(geometry.origin).max()), geometry.radius, *light.radiance)
     if not largest < LARGEST_NUMBER:
@@ -158,7 +162,7 @@ def pack_lights(lights: Sequence[AreaLight]) -> NDArray[np.float32]:
 
     A light without radiance keeps its header and gets no edges: nothing to integrate.
     """
-    packed = [_packed_light(light) for light in lights]
+    packed = [_packed(light) for light in lights]
     header = np.concatenate([np.zeros(0, LIGHT_HEADER), *(record for record, _ in packed)])
     counts = np.array([len(edges) for _, edges in packed], dtype=np.int64)
     before = np.cumsum(counts) - counts
@@ -167,7 +171,6 @@ def pack_lights(lights: Sequence[AreaLight]) -> NDArray[np.float32]:
     return np.concatenate([texels, *(edges for _, edges in packed)])
 
 
-@lru_cache(maxsize=CACHED_LIGHTS)
 def _packed_light(light: AreaLight) -> tuple[NDArray[np.void], NDArray[np.float32]]:
     """Return a header (1,), still without its first edge, and the texels (2 edges, 4)."""
     geometry = light_geometry(light)
@@ -222,12 +225,11 @@ def pack_light_shapes(lights: Sequence[AreaLight]) -> LightShapes:
     two: list[NDArray[np.void]] = []
     for index, light in enumerate(lights):
         if light.visible:
-            (two if light.two_sided else one).append(_light_triangles(light, index))
+            (two if light.two_sided else one).append(_triangles(light, index))
     vertices = np.concatenate([np.zeros(0, dtype=LIGHT_VERTEX), *one, *two])
     return LightShapes(vertices, sum(len(part) for part in one))
 
 
-@lru_cache(maxsize=CACHED_LIGHTS)
 def _light_triangles(light: AreaLight, index: int) -> NDArray[np.void]:
     points, triangles = triangulate(light.outline)
     e1, e2, to_metres = plane_basis(light.plane)
@@ -244,3 +246,9 @@ def _counter_clockwise(points: FloatArray, triangles: NDArray[np.int32]) -> NDAr
     a, b, c = (points[triangles[:, i]] for i in range(3))
     area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     return np.where(area[:, None] < 0.0, triangles[:, ::-1], triangles)
+
+
+# Hashing and per-entry overhead are worth about 1 KB.
+_geometries = ByteCache(_checked_geometry, lambda g: 1024 + g.edges.nbytes, CACHED_BYTES)
+_packed = ByteCache(_packed_light, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
+_triangles = ByteCache(_light_triangles, lambda t: 1024 + t.nbytes, CACHED_BYTES)
