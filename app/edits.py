@@ -110,21 +110,24 @@ def vertices_of(light: AreaLight) -> list[tuple[tuple[int, int], Vec2]]:
     ]
 
 
+def extent_of(light: AreaLight) -> tuple[Vec2, Vec2]:
+    """Return the lower and upper corner of the outline's bounding box, in (s, t)."""
+    points = np.concatenate([np.array(contour.points) for contour in light.outline.contours])
+    (s0, t0), (s1, t1) = points.min(0).tolist(), points.max(0).tolist()
+    return (s0, t0), (s1, t1)
+
+
 def centre_of(light: AreaLight) -> Vec3:
     """Return the world position of the centre of the outline's bounding box on the plane."""
-    points = [point for _, point in vertices_of(light)]
-    s = [point[0] for point in points]
-    t = [point[1] for point in points]
-    return point_on(light.plane, ((min(s) + max(s)) / 2.0, (min(t) + max(t)) / 2.0))
+    return point_on(light.plane, mix(*extent_of(light), 0.5))
 
 
 def bounds_of(light: AreaLight) -> tuple[Vec3, float]:
-    """Return centre and radius [m] of a sphere around the light."""
-    centre = centre_of(light)
-    radius = max(
-        length(subtract(point_on(light.plane, point), centre)) for _, point in vertices_of(light)
-    )
-    return centre, radius
+    """Return centre and radius [m] of a sphere around the light, about `centre_of`."""
+    middle = np.array(mix(*extent_of(light), 0.5))
+    points = np.concatenate([np.array(contour.points) for contour in light.outline.contours])
+    away = (points - middle) @ np.array([light.plane.u, light.plane.v])
+    return centre_of(light), float(np.linalg.norm(away, axis=-1).max())
 
 
 def _with_contour(light: AreaLight, contour: int, points: Iterable[Vec2]) -> AreaLight:

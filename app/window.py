@@ -14,7 +14,6 @@ import imgui_bundle  # noqa: F401  (first: glfw then takes the library that imgu
 import glfw
 # isort: on
 
-import contextlib
 import re
 import sys
 import time
@@ -54,6 +53,7 @@ from app.render.renderer import Renderer
 from app.render.techniques import TECHNIQUES
 from app.scene import Material, RenderSettings, Scene, SceneError, SceneObject, Shot, Transform
 from app.scene_io import demo_scenes, load_scene, save_scene
+from app.viewport import Viewport
 
 TITLE = "LTC Viewer"
 SIZE = (1440, 900)
@@ -89,6 +89,7 @@ class Window:
         self.settings = RenderSettings(samples=STILL_SAMPLES)
         self.messages = Messages()
         self.renderer: Renderer
+        self.viewport: Viewport
         self._dialogs = FileDialogs()
         self._light = 0
         self._material = scene.objects[0].material if scene.objects else ""
@@ -158,12 +159,9 @@ class Window:
 
     def _start(self) -> None:
         """Create what needs the GL context; hello_imgui calls this when it is there."""
-        from app.viewport import Viewport
-
         self.renderer = Renderer(moderngl.create_context())
         self.viewport = Viewport(self.renderer, self.messages)
-        with contextlib.suppress(Exception):
-            glfw.set_drop_callback(glfw_window_hello_imgui(), self._on_drop)
+        glfw.set_drop_callback(glfw_window_hello_imgui(), self._on_drop)
 
     def _on_drop(self, _window: Any, paths: Any, *_: Any) -> None:
         self._dropped.extend(map(str, paths))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 from imgui_bundle import imgui
 
 from app import edits
@@ -154,12 +153,8 @@ def _placement(light: AreaLight, target: Vec3) -> tuple[AreaLight, SceneError | 
 
 
 def _size(light: AreaLight) -> tuple[float, float]:
-    points = np.array([point for _, point in edits.vertices_of(light)])
-    extent = points.max(0) - points.min(0)
-    return (
-        float(extent[0] * length(light.plane.u)),
-        float(extent[1] * length(light.plane.v)),
-    )
+    (s0, t0), (s1, t1) = edits.extent_of(light)
+    return (s1 - s0) * length(light.plane.u), (t1 - t0) * length(light.plane.v)
 
 
 def _resized(light: AreaLight, across: float, along: float) -> AreaLight:
