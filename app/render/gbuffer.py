@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from app.errors import InputError
 from app.meshes import Mesh, load_mesh
 from app.render.camera import CameraFrame, normal_from_object, world_from_object
-from app.render.pack import LARGEST_NUMBER, pack_light_shapes
+from app.render.pack import LARGEST_NUMBER, SMALLEST_NUMBER, pack_light_shapes
 from app.render.programs import Programs, ProgramSpec, set_uniform, write_uniform
 from app.render.state import begin_pass
 from app.scene import AreaLight, SceneObject
@@ -89,6 +89,30 @@ class _Instance:
     mirrors: bool
 
 
+def _instance(item: SceneObject) -> _Instance:
+    """Return an object's matrices; raise `InputError` if float32 cannot hold them."""
+    matrix = world_from_object(item.transform)
+    largest = float(np.abs(matrix).max())
+    if not largest < LARGEST_NUMBER:
+        raise InputError(
+            f"object '{item.name}': its transform reaches {largest:g}, "
+            f"expected numbers below {LARGEST_NUMBER:g}"
+        )
+    smallest = min(abs(factor) for factor in item.transform.scale)
+    if not smallest > SMALLEST_NUMBER:
+        raise InputError(
+            f"object '{item.name}': its scale goes down to {smallest:g}, "
+            f"expected numbers above {SMALLEST_NUMBER:g}"
+        )
+    return _Instance(
+        item.mesh,
+        matrix,
+        np.asarray(np.linalg.inv(matrix), dtype=np.float64),
+        normal_from_object(matrix),
+        bool(np.linalg.det(matrix[:3, :3]) < 0.0),
+    )
+
+
 def _is_outside(eye: NDArray[np.float64], instance: _Instance, mesh: Mesh) -> bool:
     """Return whether the eye is outside the box around an object's mesh."""
     low, high = mesh.bounds.astype(np.float64)
@@ -103,7 +127,7 @@ class GBufferPass:
         self._ctx = ctx
         self._programs = programs
         self._meshes: dict[str, tuple[Mesh, _Vertices]] = {}
-        self._instances: list[_Instance] = []
+        self._instances: dict[SceneObject, _Instance] = {}
         self._shapes: _Vertices | None = None
         self._shape_counts = (0, 0)
         self.uploads = {"meshes": 0, "light shapes": 0}
@@ -117,19 +141,7 @@ class GBufferPass:
             If a mesh cannot be loaded; what was held stays.
         """
         meshes = load_meshes(objects)
-        instances = []
-        for item in objects:
-            matrix = world_from_object(item.transform)
-            largest = float(np.abs(matrix).max())
-            if not largest < LARGEST_NUMBER:
-                raise InputError(
-                    f"object '{item.name}': its transform reaches {largest:g}, "
-                    f"expected numbers below {LARGEST_NUMBER:g}"
-                )
-            normal = normal_from_object(matrix)
-            mirrors = bool(np.linalg.det(matrix[:3, :3]) < 0.0)
-            inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
-            instances.append(_Instance(item.mesh, matrix, inverse, normal, mirrors))
+        instances = {item: self._instances.get(item) or _instance(item) for item in objects}
         for name in list(self._meshes):
             if self._meshes[name][0] is not meshes.get(name):
                 self._meshes.pop(name)[1].release()
@@ -170,7 +182,7 @@ class GBufferPass:
         if self._instances:
             program = self._programs.get(OBJECTS)
             set_uniform(program, "clip_window", window)
-            for index, instance in enumerate(self._instances):
+            for index, instance in enumerate(self._instances.values()):
                 clip_from_object = clip_from_world @ instance.world_from_object
                 write_uniform(program, "clip_from_object", clip_from_object)
                 write_uniform(program, "world_from_object_normal", instance.normal)
@@ -210,7 +222,7 @@ class GBufferPass:
         for _, vertices in self._meshes.values():
             vertices.release()
         self._meshes.clear()
-        self._instances = []
+        self._instances = {}
         if self._shapes is not None:
             self._shapes.release()
             self._shapes = None

@@ -10,6 +10,7 @@ Everything is computed in float64 and rounded once.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -68,6 +69,8 @@ MAX_INDEX = 2**24
 """Texel indices are stored as float32."""
 CACHED_BYTES = 16 * 2**20
 """Of each of the three things that are kept of every light."""
+SMALLEST_NUMBER = 1e-12
+"""Lengths [m] and scales up to here would vanish from products of three."""
 LARGEST_NUMBER = 1e12
 """Lengths [m] and radiance from here on would overflow float32 in products of three."""
 
@@ -119,6 +122,12 @@ def light_geometry(light: AreaLight) -> LightGeometry:
 
 
 def _checked_geometry(light: AreaLight) -> LightGeometry:
+    for name, axis in (("u", light.plane.u), ("v", light.plane.v)):
+        if not SMALLEST_NUMBER < math.hypot(*axis) < LARGEST_NUMBER:
+            raise InputError(
+                f"light '{light.name}': its plane's {name} is {math.hypot(*axis):g} long, "
+                f"expected between {SMALLEST_NUMBER:g} and {LARGEST_NUMBER:g} metres"
+            )
     geometry = _light_geometry(light)
     largest = max(float(np.abs(geometry.origin).max()), geometry.radius, *light.radiance)
     if not largest < LARGEST_NUMBER:

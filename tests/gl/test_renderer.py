@@ -393,6 +393,13 @@ def test_numbers_that_float32_cannot_hold(renderer: Renderer) -> None:
     for light in (bright, far):
         with pytest.raises(InputError, match=r"light 'key': it reaches 1e\+(30|200), expected"):
             renderer.render(shot(one_light(GLOSSY, light)))
+    for axis in (1e-160, 1e-13, 1e13):
+        tiny = replace(KEY, plane=Plane((0.0, 0.0, 0.0), (axis, 0.0, 0.0), (0.0, axis, 0.0)))
+        with pytest.raises(InputError, match=r"light 'key': its plane's u is 1e[+-]\d+ long"):
+            renderer.render(shot(one_light(GLOSSY, tiny)))
+    flat = replace(floor(), transform=Transform(scale=(1.0, 1e-300, 1.0)))
+    with pytest.raises(InputError, match=r"object 'floor': its scale goes down to 1e-300"):
+        renderer.render(shot(replace(one_light(), objects=(flat,))))
     huge = replace(floor(), transform=Transform(scale=(1e13, 1.0, 1.0)))
     with pytest.raises(InputError, match=r"object 'floor': its transform reaches 1e\+13"):
         renderer.render(shot(replace(one_light(), objects=(huge,))))
