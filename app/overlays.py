@@ -54,12 +54,16 @@ class Middle:
 
 @dataclass(frozen=True, slots=True)
 class Canvas:
-    """Where to draw, seen how: a draw list, the picture's place, a camera, the size of a point."""
+    """Where to draw, seen how: a draw list, the picture's place, a camera, the size of a point.
+
+    ``crowded`` makes corners smaller, for lights that have many.
+    """
 
     draw: imgui.ImDrawList
     view: View
     camera: Camera
     unit: float
+    crowded: bool = False
 
     def segment(self, a: Vec3, b: Vec3, ink: int, thickness: float) -> None:
         """Draw what is in front of the eye of a line between two world points."""
@@ -109,7 +113,7 @@ class Canvas:
     def corner(self, at: tuple[float, float], *, near: bool, chosen: bool, hidden: bool) -> None:
         """Draw a corner: larger under the pointer, ringed when selected, dim when hidden."""
         centre = ImVec2(*at)
-        radius = self.unit * (6.5 if near or chosen else 5.0)
+        radius = self.unit * (6.5 if near or chosen else 3.2 if self.crowded else 5.0)
         alpha = 0.4 if hidden and not (near or chosen) else 1.0
         fill = theme.ACCENT if chosen or near else theme.grey(0.97)
         self.draw.add_circle_filled(centre, radius + 1.5, theme.u32(theme.grey(0.0), 0.6 * alpha))

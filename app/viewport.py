@@ -46,6 +46,8 @@ SMALLEST = 4
 UNDER_STATUS_BAR = 1
 """Points by which hello_imgui's status bar covers the docked windows."""
 
+CROWD = 16
+"""Corners from which on they are drawn smaller."""
 MOST_HANDLES = 400
 """Corners beyond this number get no handles: they would hide the light."""
 MOST_ASKED = 64
@@ -511,7 +513,7 @@ class Viewport:
             if chosen.kind == "light" and chosen.index == index:
                 canvas.outline(light, theme.ACCENT, 1.0, 1.8)
                 canvas.direction(light)
-                self._corners(canvas, editor, light)
+                self._corners(editor, light, camera)
             elif index == self._hovered_light:
                 canvas.outline(light, theme.ACCENT, 0.55, 1.5)
             elif not light.visible:
@@ -521,19 +523,21 @@ class Viewport:
                 canvas.box(box_corners(scene, chosen.index))
         draw.pop_clip_rect()
 
-    def _corners(self, canvas: Canvas, editor: Editor, light: AreaLight) -> None:
+    def _corners(self, editor: Editor, light: AreaLight, camera: Camera) -> None:
         """Draw the handles of the selected light."""
         vertices = edits.vertices_of(light)
+        draw, crowded = imgui.get_window_draw_list(), len(vertices) > CROWD
+        canvas = Canvas(draw, self.view, camera, self._unit, crowded)
         if len(vertices) > MOST_HANDLES:
             return
         if self.is_settled:
             self._find_hidden(editor.scene, editor.selection.index)
         mouse = imgui.get_io().mouse_pos
-        for middle in middles_of(self.view, canvas.camera, light):
+        for middle in middles_of(self.view, camera, light):
             if middle.has_room:
                 canvas.middle(middle.at, near=is_near(middle.at, mouse, self._unit))
         for vertex, point in vertices:
-            at = self.view.project(canvas.camera, edits.point_on(light.plane, point))
+            at = self.view.project(camera, edits.point_on(light.plane, point))
             if at is not None:
                 canvas.corner(
                     at,

@@ -92,7 +92,7 @@ class Window:
         self.viewport: Viewport
         self._dialogs = FileDialogs()
         self._light = 0
-        self._material = scene.objects[0].material if scene.objects else ""
+        self._material = _first_material(scene)
         self._export = Export()
         self._exporting: _Export | None = None
         self._ask_export = False
@@ -517,17 +517,19 @@ class Window:
         self.editor.open(scene, path)
         self.messages.clear()
         self._light = 0
-        self._material = scene.objects[0].material if scene.objects else ""
+        self._material = _first_material(scene)
         self._select_first()
 
     def _select_first(self) -> None:
-        """Select the first light in the middle of the picture, so that its corners show."""
+        """Select the light with the fewest corners amid the picture: the one to try first."""
         scene = self.editor.scene
+        shown = []
         for index, light in enumerate(scene.lights):
             at = project(scene.camera, edits.centre_of(light), 16.0, 9.0)
-            if at is not None and 1.0 < at[0] < 15.0 and 1.0 < at[1] < 8.0:
-                self.editor.selection = Selection.light(index)
-                return
+            if light.visible and at is not None and 1.0 < at[0] < 15.0 and 1.0 < at[1] < 8.0:
+                shown.append((len(edits.vertices_of(light)), index))
+        if shown:
+            self.editor.selection = Selection.light(min(shown)[1])
 
     def new(self) -> None:
         """Start a scene of a floor and one light, after asking about unsaved edits."""
@@ -807,6 +809,12 @@ def _plan_lines(plan: Plan) -> tuple[PlanLine, ...]:
     ]
     lines += [PlanLine("Left out", left.what, left.why, used=False) for left in plan.left_out]
     return tuple(lines)
+
+
+def _first_material(scene: Scene) -> str:
+    """Return the material to show first: that of a real thing, not of floor or wall, if any."""
+    things = [item for item in scene.objects if item.mesh not in ("plane", "box")]
+    return next((item.material for item in (*things, *scene.objects)), "")
 
 
 def spoken(name: str) -> str:
