@@ -32,7 +32,7 @@ from imgui_bundle.glfw_utils import glfw_window_hello_imgui
 from imgui_bundle.imguizmo import im_guizmo as gizmo
 
 from app import edits, theme
-from app.camera_control import project
+from app.camera_control import project, widened
 from app.dialogs import MESHES, PICTURES, SCENES, FileDialogs
 from app.editor import NOTHING, Editor, Selection, duplicate_selected, remove_selected
 from app.errors import InputError
@@ -683,12 +683,14 @@ class Window:
         return path.with_suffix(f".{kind}") if path else Path.home() / f"picture.{kind}"
 
     def export(self, path: Path, export: Export | None = None) -> None:
-        """Start to render a picture file; `is_exporting` until it is written."""
+        """Start to render a picture file, framed as in the window; `is_exporting` until written."""
         chosen = export or self._export
         settings = replace(self.settings, samples=chosen.samples)
 
         def do() -> None:
-            shot = Shot(self.editor.scene, settings, chosen.width, chosen.height)
+            scene = self.editor.scene
+            camera = widened(scene.camera, chosen.width / chosen.height)
+            shot = Shot(replace(scene, camera=camera), settings, chosen.width, chosen.height)
             self._exporting = _Export(path, shot, Renderer(self.renderer.ctx))
 
         self._guarded(do)
