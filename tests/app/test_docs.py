@@ -15,6 +15,7 @@ import pytest
 from app.cli.main import run
 from app.scene_io import demo_scenes, scene_from_json, scene_to_json
 from ltc.__main__ import main as ltc_main
+from ltc.table import load_isotropic
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -112,6 +113,22 @@ def test_documented_defaults_are_the_real_ones() -> None:
             assert part[key] == json.loads(default), f"{name}.{key}"
             checked += 1
     assert checked >= 14
+
+
+def test_accuracy_figures_are_those_of_the_shipped_table() -> None:
+    figures = load_isotropic().provenance["error"]["rectangles"]
+    measured = [figures[key] for key in ("mean", "p95", "p99", "max")]
+    measured += list(figures["theta"].values())
+    rows = re.findall(
+        r"^\| (?:absolute|mean) error \| (.*) \|$",
+        (ROOT / "README.md").read_text("utf-8"),
+        re.MULTILINE,
+    )
+    shown = [cell.strip() for row in rows for cell in row.split("|")]
+    assert len(shown) == len(measured)
+    for text, value in zip(shown, measured, strict=True):
+        half_a_digit = 0.5 * 10.0 ** -len(text.split(".")[1])
+        assert abs(float(text) - value) <= 1.001 * half_a_digit, text
 
 
 def test_make_targets_exist() -> None:
