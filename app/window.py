@@ -50,7 +50,7 @@ from app.panels.status import help_line, status_bar
 from app.panels.widgets import button, hint, name_field
 from app.render.plan import Plan
 from app.render.renderer import Renderer
-from app.render.techniques import TECHNIQUES
+from app.render.techniques import TECHNIQUES, find_technique
 from app.scene import Material, RenderSettings, Scene, SceneError, SceneObject, Shot, Transform
 from app.scene_io import demo_scenes, load_scene, save_scene
 from app.viewport import Viewport
@@ -304,7 +304,7 @@ class Window:
     def _material_rows(self, scene: Scene, material: Material, item: SceneObject | None) -> None:
         changed = scene
         name = name_field("Name", material.name, "The material's name; objects share materials")
-        new = material_panel(material)
+        new = material_panel(material, find_technique(self.settings.technique).anisotropic)
         if new != material:
             changed = edits.replace_material(scene, material.name, new)
         elif name != material.name:

@@ -27,7 +27,7 @@ from app.cli.common import (
     whole_number,
 )
 from app.files import check_output, replace_file
-from app.render.techniques import check_technique
+from app.render.techniques import find_technique
 from app.scene import RenderSettings, Scene, Shot
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def bench(
     """
     width, height = image_size(size)
     for technique in techniques:
-        check_technique(technique)
+        find_technique(technique)
     if json_file is not None:
         check_output(json_file, "a table of figures", (".json",))
     loaded = [(name, named_scene(name)) for name in scenes]

@@ -75,8 +75,8 @@ def _list_techniques(value: list[str] | str | None) -> list[str] | str | None:
     names = [value] if isinstance(value, str) else value or []
     if "help" in names:
         width = max(len(name) for name in TECHNIQUES)
-        for name, line in TECHNIQUES.items():
-            typer.echo(f"{name:{width}}  {line}")
+        for name, technique in TECHNIQUES.items():
+            typer.echo(f"{name:{width}}  {technique.description}")
         raise typer.Exit
     return value
 

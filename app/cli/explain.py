@@ -20,7 +20,7 @@ from app.cli.common import (
     messages,
     named_scene,
 )
-from app.render.techniques import check_technique
+from app.render.techniques import find_technique
 from app.scene import RenderSettings, Shot
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def explain(
       ltc-viewer explain scene.json --size 1920x1080
     """
     width, height = image_size(size)
-    check_technique(technique)
+    find_technique(technique)
     settings = RenderSettings(technique=technique, samples=samples)
     plan = _plan(Shot(named_scene(scene), settings, width, height))
     if as_json:

@@ -23,6 +23,7 @@ from app.render.pack import (
     TEXELS_PER_MATERIAL,
     light_geometry,
 )
+from app.render.techniques import DEFAULT_TECHNIQUE, find_technique
 from app.scene import AreaLight, Material, Scene
 
 STORAGE_TEXTURE_WIDTH = 1024
@@ -130,6 +131,11 @@ class LightingFeatures:
     uniform_materials : int
         Array length of the material block, 0 where materials need a texture
         (or nothing is shaded).
+    technique : str
+        Whose shaders are included; the default one's where nothing is glossy,
+        because diffuse reflection is the same in all.
+    tangents : bool
+        Some glossy material is anisotropic, and the technique shades it so.
     """
 
     specular: bool
@@ -138,9 +144,13 @@ class LightingFeatures:
     accumulates: bool
     lights: LightNeeds
     uniform_materials: int
+    technique: str
+    tangents: bool
 
     @classmethod
-    def of(cls, scene: Scene, samples: int, limits: Limits) -> LightingFeatures:
+    def of(
+        cls, scene: Scene, samples: int, limits: Limits, technique: str = DEFAULT_TECHNIQUE
+    ) -> LightingFeatures:
         """Raise `InputError` if lights or objects are more than the machine can hold."""
         lights = LightNeeds.of(scene.lights, limits)
         shines = lights.one_sided or lights.two_sided
@@ -161,7 +171,16 @@ class LightingFeatures:
             samples > 1,
             lights,
             rounded if fits else 0,
+            technique if specular else DEFAULT_TECHNIQUE,
+            specular
+            and find_technique(technique).anisotropic
+            and any(material.is_anisotropic and any(material.f0) for material in used),
         )
+
+    @property
+    def reads_tables(self) -> bool:
+        """Whether the technique's tables are looked up."""
+        return self.specular and find_technique(self.technique).has_tables
 
     @property
     def shades(self) -> bool:
@@ -184,15 +203,28 @@ class LightingFeatures:
             "HAS_SHAPES": int(self.shapes),
             "ACCUMULATES": int(self.accumulates),
             "PROBES": 0,
+            "HAS_TANGENTS": int(self.tangents),
+            **technique_defines(self.technique),
             "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
             "MATERIAL_TEXELS": self.uniform_materials,
             **lights.defines(),
         }
 
 
-def probe_defines(lights: LightNeeds) -> dict[str, int]:
+def technique_defines(technique: str) -> dict[str, int]:
+    """Return the numbers that choose a technique's shaders."""
+    return {"TECHNIQUE_GGX": int(technique == "ggx"), "GGX_NODES": 2}
+
+
+def probe_defines(lights: LightNeeds, technique: str) -> dict[str, int]:
     """Return the numbers that the probe's shaders are assembled with: a white, glossy material."""
-    return {"HAS_SPECULAR": 1, "HAS_DIFFUSE": 1, "PROBES": 1, **lights.defines()}
+    return {
+        "HAS_SPECULAR": 1,
+        "HAS_DIFFUSE": 1,
+        "PROBES": 1,
+        **technique_defines(technique),
+        **lights.defines(),
+    }
 
 
 def used_materials(scene: Scene) -> tuple[Material, ...]:

@@ -1,7 +1,8 @@
 """The G-buffer pass: which surface each pixel sees, and where.
 
 One RGBA32F attachment holds (octahedral normal, depth along the view axis [m],
-id); the background's depth is 0. Ids: an object's index, or -1 - i for light i.
+id); the background's depth is 0. Where anisotropic materials are shaded a second,
+RG32F, holds the octahedral tangent. Ids: an object's index, or -1 - i for light i.
 """
 
 from __future__ import annotations
@@ -21,15 +22,21 @@ from app.render.programs import Programs, ProgramSpec, set_uniform, write_unifor
 from app.render.state import begin_pass
 from app.scene import AreaLight, SceneObject
 
-OBJECTS = ProgramSpec.of("gbuffer", "passes/gbuffer.vert", "passes/gbuffer.frag")
 LIGHTS = ProgramSpec.of("light shapes", "passes/light_shape.vert", "passes/light_shape.frag")
 
 WHOLE_PICTURE = (1.0, 1.0, 0.0, 0.0)
 
 
-def mesh_bytes(mesh: Mesh) -> int:
-    """Return the bytes that a mesh takes on the GPU: positions, normals, indices."""
-    return 4 * (mesh.positions.size + mesh.normals.size + mesh.indices.size)
+def objects_spec(tangents: bool) -> ProgramSpec:
+    """Return the program that draws objects, with or without their tangents."""
+    features = {"HAS_TANGENTS": int(tangents)}
+    return ProgramSpec.of("gbuffer", "passes/gbuffer.vert", "passes/gbuffer.frag", features)
+
+
+def mesh_bytes(mesh: Mesh, tangents: bool) -> int:
+    """Return the bytes that a mesh takes on the GPU: vertices and indices."""
+    floats = mesh.positions.size + mesh.normals.size + (mesh.tangents.size if tangents else 0)
+    return 4 * (floats + mesh.indices.size)
 
 
 def load_meshes(objects: Sequence[SceneObject]) -> dict[str, Mesh]:
@@ -128,12 +135,18 @@ class GBufferPass:
         self._programs = programs
         self._meshes: dict[str, tuple[Mesh, _Vertices]] = {}
         self._instances: dict[SceneObject, _Instance] = {}
+        self._tangents = False
         self._shapes: _Vertices | None = None
         self._shape_counts = (0, 0)
         self.uploads = {"meshes": 0, "light shapes": 0}
 
-    def set_objects(self, objects: Sequence[SceneObject]) -> None:
-        """Hold the meshes of ``objects`` and no others.
+    @property
+    def has_tangents(self) -> bool:
+        """Whether objects are held, and drawn, with their tangents."""
+        return self._tangents
+
+    def set_objects(self, objects: Sequence[SceneObject], tangents: bool) -> None:
+        """Hold the meshes of ``objects`` and no others, with their tangents if asked for.
 
         Raises
         ------
@@ -143,16 +156,20 @@ class GBufferPass:
         meshes = load_meshes(objects)
         instances = {item: self._instances.get(item) or _instance(item) for item in objects}
         for name in list(self._meshes):
-            if self._meshes[name][0] is not meshes.get(name):
+            if self._meshes[name][0] is not meshes.get(name) or self._tangents != tangents:
                 self._meshes.pop(name)[1].release()
         for name, mesh in meshes.items():
             if name not in self._meshes:
-                data = np.hstack([mesh.positions, mesh.normals], dtype=np.float32)
+                parts = [mesh.positions, mesh.normals, *([mesh.tangents] if tangents else [])]
+                data = np.hstack(parts, dtype=np.float32)
                 indices = mesh.indices.astype(np.uint32).tobytes()
-                vertices = _Vertices(self._ctx, data.tobytes(), "3f 3f", indices)
+                vertices = _Vertices(
+                    self._ctx, data.tobytes(), " ".join(["3f"] * len(parts)), indices
+                )
                 self._meshes[name] = (mesh, vertices)
                 self.uploads["meshes"] += 1
         self._instances = instances
+        self._tangents = tangents
 
     def set_lights(self, lights: Sequence[AreaLight]) -> None:
         """Hold the triangles of the visible ones of ``lights``."""
@@ -180,12 +197,15 @@ class GBufferPass:
         target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
         clip_from_world = frame.clip_from_world()
         if self._instances:
-            program = self._programs.get(OBJECTS)
+            program = self._programs.get(objects_spec(self._tangents))
             set_uniform(program, "clip_window", window)
             for index, instance in enumerate(self._instances.values()):
                 clip_from_object = clip_from_world @ instance.world_from_object
                 write_uniform(program, "clip_from_object", clip_from_object)
                 write_uniform(program, "world_from_object_normal", instance.normal)
+                if self._tangents:
+                    linear = instance.world_from_object[:3, :3]
+                    write_uniform(program, "world_from_object", linear)
                 ctx.front_face = "cw" if instance.mirrors else "ccw"
                 set_uniform(program, "object_id", float(index))
                 mesh, vertices = self._meshes[instance.mesh]

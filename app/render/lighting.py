@@ -23,7 +23,10 @@ from app.render.tables import isotropic_textures
 from app.scene import AreaLight, Material
 
 # Texture units and uniform block bindings; each pass binds its own anew.
-SURFACES, HISTORY, LIGHTS, MATERIALS, TABLE_RESIDUAL, TABLE_ALBEDO = range(6)
+SURFACES, TANGENTS, HISTORY, LIGHTS, MATERIALS, TABLE_RESIDUAL, TABLE_ALBEDO = range(7)
+
+POINT_INPUTS = ("positions", "normals", "tangents", "views", "alphas")
+FIRST_POINT_UNIT = 8
 
 PROBE_SIDE = 1024
 """Points are probed in pictures of at most this side."""
@@ -36,10 +39,10 @@ def lighting_spec(features: LightingFeatures) -> ProgramSpec:
     )
 
 
-def probe_spec(lights: LightNeeds) -> ProgramSpec:
-    """Return the probe's program for a scene's lights."""
+def probe_spec(lights: LightNeeds, technique: str) -> ProgramSpec:
+    """Return the probe's program for a scene's lights and a technique."""
     return ProgramSpec.of(
-        "probe", "passes/fullscreen.vert", "passes/probe.frag", probe_defines(lights)
+        "probe", "passes/fullscreen.vert", "passes/probe.frag", probe_defines(lights, technique)
     )
 
 
@@ -96,6 +99,7 @@ class LightingPass:
         self,
         target: moderngl.Framebuffer,
         surfaces: moderngl.Texture,
+        tangents: moderngl.Texture | None,
         features: LightingFeatures,
         frame: CameraFrame,
         offset: tuple[float, float],
@@ -106,6 +110,8 @@ class LightingPass:
 
         Parameters
         ----------
+        tangents : texture or None
+            The G-buffer's second attachment, where ``features`` ask for it.
         offset : (right, up)
             Where in its pixel the G-buffer's sample lies, from the centre [pixels].
         history : texture or None
@@ -116,6 +122,9 @@ class LightingPass:
         program = self._programs.get(lighting_spec(features))
         set_uniform(program, "surfaces", SURFACES)
         surfaces.use(SURFACES)
+        if tangents is not None:
+            set_uniform(program, "tangents", TANGENTS)
+            tangents.use(TANGENTS)
         if history is not None:
             set_uniform(program, "history", HISTORY)
             history.use(HISTORY)
@@ -136,17 +145,19 @@ class LightingPass:
     def probe(
         self,
         needs: LightNeeds,
+        technique: str,
         position: NDArray[np.float32],
         normal: NDArray[np.float32],
+        tangent: NDArray[np.float32],
         view: NDArray[np.float32],
         alpha: NDArray[np.float32],
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return (specular, diffuse), each (n, 3), of a white material at n points."""
-        program = self._programs.get(probe_spec(needs))
+        program = self._programs.get(probe_spec(needs, technique))
         batch = PROBE_SIDE * PROBE_SIDE
         pieces = [
             self._probe_batch(program, [a[start : start + batch] for a in inputs])
-            for inputs in [(position, normal, view, alpha)]
+            for inputs in [(position, normal, tangent, view, alpha)]
             for start in range(0, len(position), batch)
         ]
         empty = np.zeros((0, 3), dtype=np.float32)
@@ -162,7 +173,7 @@ class LightingPass:
         height = -(-count // width)
         with ExitStack() as stack:
             for unit, (name, values) in enumerate(
-                zip(("positions", "normals", "views", "alphas"), inputs, strict=True), start=6
+                zip(POINT_INPUTS, inputs, strict=True), start=FIRST_POINT_UNIT
             ):
                 # Points that fill up the last row repeat the last one: all are valid.
                 filled = np.concatenate([values, values[-1:].repeat(width * height - count, 0)])

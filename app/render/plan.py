@@ -12,15 +12,25 @@ from pathlib import Path
 
 from app.render import gbuffer
 from app.render.features import LightingFeatures, Limits, used_materials
-from app.render.gbuffer import load_meshes, mesh_bytes
+from app.render.gbuffer import load_meshes, mesh_bytes, objects_spec
 from app.render.lighting import lighting_spec
 from app.render.pack import LIGHT_VERTEX, TEXELS_PER_MATERIAL, pack_light_shapes
 from app.render.post import display_spec
 from app.render.programs import ProgramSpec
 from app.render.storage import storage_bytes
 from app.render.tables import isotropic_textures
-from app.render.techniques import TECHNIQUES, check_technique
+from app.render.techniques import DEFAULT_TECHNIQUE, find_technique
 from app.scene import TONE_MAPS, Scene, Shot
+
+ATTACHMENTS = {
+    "gbuffer": "RGBA32F",
+    "tangents": "RG32F",
+    "depth": "DEPTH24",
+    "radiance": "RGBA32F",
+    "radiance 2": "RGBA32F",
+    "display": "RGBA8",
+}
+"""Every attachment's format."""
 
 FORMAT_BYTES = {"RGBA32F": 16, "RG32F": 8, "RGBA8": 4, "DEPTH24": 4}
 """Bytes of a pixel; 24 bits of depth are stored in 32."""
@@ -45,7 +55,9 @@ class Needs:
         return any(name == "radiance 2" for name, _ in self.attachments)
 
 
-def needs_of(scene: Scene, samples: int, limits: Limits) -> Needs:
+def needs_of(
+    scene: Scene, samples: int, limits: Limits, technique: str = DEFAULT_TECHNIQUE
+) -> Needs:
     """Return what a scene needs with ``samples`` per pixel.
 
     Raises
@@ -53,21 +65,23 @@ def needs_of(scene: Scene, samples: int, limits: Limits) -> Needs:
     InputError
         If lights or objects are more than the machine can hold.
     """
-    lighting = LightingFeatures.of(scene, samples, limits)
+    lighting = LightingFeatures.of(scene, samples, limits, technique)
     programs: list[ProgramSpec] = []
-    attachments: list[tuple[str, str]] = []
+    attachments: list[str] = []
     if lighting.lit:
-        attachments += [("gbuffer", "RGBA32F"), ("depth", "DEPTH24")]
+        attachments += ["gbuffer", *(["tangents"] if lighting.tangents else []), "depth"]
         if scene.objects:
-            programs.append(gbuffer.OBJECTS)
+            programs.append(objects_spec(lighting.tangents))
         if lighting.shapes:
             programs.append(gbuffer.LIGHTS)
         programs.append(lighting_spec(lighting))
-    attachments.append(("radiance", "RGBA32F"))
+    attachments.append("radiance")
     if lighting.lit and lighting.accumulates:
-        attachments.append(("radiance 2", "RGBA32F"))
-    attachments.append(("display", "RGBA8"))
-    return Needs(lighting, tuple(programs), tuple(attachments))
+        attachments.append("radiance 2")
+    attachments.append("display")
+    return Needs(
+        lighting, tuple(programs), tuple((name, ATTACHMENTS[name]) for name in attachments)
+    )
 
 
 @dataclass(frozen=True)
@@ -190,13 +204,13 @@ def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path]) -> Plan:
         If a shader does not assemble.
     """
     scene, settings = shot.scene, shot.settings
-    check_technique(settings.technique)
-    needs = needs_of(scene, settings.samples, limits)
+    technique = find_technique(settings.technique)
+    needs = needs_of(scene, settings.samples, limits, settings.technique)
     pixels = shot.width * shot.height
     samples = "1 sample" if settings.samples == 1 else f"{settings.samples} samples"
     return Plan(
         f"{shot.width}x{shot.height}, {samples} per pixel, technique {settings.technique} "
-        f"({TECHNIQUES[settings.technique]})",
+        f"({technique.description})",
         tuple(
             _planned_program(spec, roots) for spec in (*needs.programs, display_spec(scene.display))
         ),
@@ -224,7 +238,7 @@ def _planned_program(spec: ProgramSpec, roots: Sequence[Path]) -> PlannedProgram
 
 
 def _tables(features: LightingFeatures) -> tuple[PlannedResource, ...]:
-    if not features.specular:
+    if not features.reads_tables:
         return ()
     return tuple(
         PlannedResource(
@@ -243,7 +257,7 @@ def _buffers(scene: Scene, features: LightingFeatures) -> tuple[PlannedResource,
     parts = []
     for name, mesh in load_meshes(scene.objects).items():
         form = f"vertices and indices, {len(mesh.indices)} triangles"
-        parts.append(PlannedResource(f"mesh {name}", form, mesh_bytes(mesh)))
+        parts.append(PlannedResource(f"mesh {name}", form, mesh_bytes(mesh, features.tangents)))
     if features.shapes:
         vertices = len(pack_light_shapes(scene.lights).vertices)
         parts.append(
@@ -322,10 +336,14 @@ def _left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
         leave("G-buffer and its program", why, pixels * bytes_each)
         leave("lighting program", why)
     if not features.specular:
-        why = dark or "every material has f0 = 0"
-        leave("specular shading", why)
+        leave("specular shading", dark or "every material has f0 = 0")
+    if not features.reads_tables:
+        if features.specular:
+            why = f"technique {features.technique} needs none"
+        else:
+            why = f"{dark or 'every material has f0 = 0'}, so nothing looks them up"
         tables = sum(int(texels.nbytes) for texels in isotropic_textures())
-        leave("tables of the technique", f"{why}, so nothing looks them up", tables)
+        leave("tables of the technique", why, tables)
     if not features.diffuse:
         leave("diffuse shading", dark or "every material has diffuse = 0")
     if not features.shades and features.lit:
@@ -342,10 +360,13 @@ def _left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
             "one sample per pixel needs no history",
             pixels * FORMAT_BYTES["RGBA32F"],
         )
-    if features.lit:
+    if features.lit and not features.tangents:
+        anisotropic = any(material.is_anisotropic and any(material.f0) for material in used)
         leave(
             "second G-buffer attachment (tangents)",
-            "technique ltc shades no anisotropic lobes",
+            f"technique {features.technique} shades no anisotropic lobes"
+            if anisotropic and features.specular
+            else "no glossy material is anisotropic",
             pixels * FORMAT_BYTES["RG32F"],
         )
     others = [name for name in TONE_MAPS if name != scene.display.tone_map]

@@ -21,12 +21,12 @@ from app.render.camera import CameraFrame
 from app.render.features import LightNeeds, Limits, used_materials
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
-from app.render.plan import FORMAT_BYTES, Needs, Plan, make_plan, needs_of
+from app.render.plan import ATTACHMENTS, FORMAT_BYTES, Needs, Plan, make_plan, needs_of
 from app.render.post import DisplayPass
 from app.render.programs import Programs
 from app.render.sampling import pixel_offset
 from app.render.state import begin_pass, release_framebuffer
-from app.render.techniques import check_technique
+from app.render.techniques import find_technique
 from app.render.timers import PassTimers
 from app.scene import Display, RenderSettings, Scene, Shot
 
@@ -69,7 +69,7 @@ class _Targets:
         self.size = (0, 0)
         self._textures: dict[str, moderngl.Texture] = {}
         self._depth: moderngl.Renderbuffer | None = None
-        self._framebuffers: dict[str, moderngl.Framebuffer] = {}
+        self._framebuffers: dict[tuple[str, ...], moderngl.Framebuffer] = {}
 
     def resize(self, size: tuple[int, int]) -> None:
         if size != self.size:
@@ -82,25 +82,26 @@ class _Targets:
                 if name == "display":
                     texture = self._ctx.texture(self.size, 4)
                 else:
-                    texture = self._ctx.texture(self.size, 4, dtype="f4")
+                    channels = 2 if name == "tangents" else 4
+                    texture = self._ctx.texture(self.size, channels, dtype="f4")
             except moderngl.Error as error:
                 raise self._too_large(error) from error
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self._textures[name] = texture
         return self._textures[name]
 
-    def framebuffer(self, name: str, *, depth: bool = False) -> moderngl.Framebuffer:
-        if name not in self._framebuffers:
-            texture = self.texture(name)
+    def framebuffer(self, *names: str, depth: bool = False) -> moderngl.Framebuffer:
+        if names not in self._framebuffers:
+            textures = [self.texture(name) for name in names]
             try:
                 if depth and self._depth is None:
                     self._depth = self._ctx.depth_renderbuffer(self.size)
-                self._framebuffers[name] = self._ctx.framebuffer(
-                    color_attachments=[texture], depth_attachment=self._depth if depth else None
+                self._framebuffers[names] = self._ctx.framebuffer(
+                    color_attachments=textures, depth_attachment=self._depth if depth else None
                 )
             except moderngl.Error as error:
                 raise self._too_large(error) from error
-        return self._framebuffers[name]
+        return self._framebuffers[names]
 
     def _too_large(self, error: moderngl.Error) -> InputError:
         return InputError(
@@ -110,8 +111,8 @@ class _Targets:
 
     def keep_only(self, names: set[str]) -> None:
         for name in [n for n in self._textures if n not in names]:
-            if name in self._framebuffers:
-                release_framebuffer(self._framebuffers.pop(name))
+            for used in [u for u in self._framebuffers if name in u]:
+                release_framebuffer(self._framebuffers.pop(used))
             self._textures.pop(name).release()
         if "gbuffer" not in names and self._depth is not None:
             self._depth.release()
@@ -119,12 +120,9 @@ class _Targets:
 
     def allocated(self) -> dict[str, int]:
         pixels = self.size[0] * self.size[1]
-        held = {
-            name: pixels * FORMAT_BYTES["RGBA8" if name == "display" else "RGBA32F"]
-            for name in self._textures
-        }
+        held = {name: pixels * FORMAT_BYTES[ATTACHMENTS[name]] for name in self._textures}
         if self._depth is not None:
-            held["depth"] = pixels * FORMAT_BYTES["DEPTH24"]
+            held["depth"] = pixels * FORMAT_BYTES[ATTACHMENTS["depth"]]
         return held
 
     def release(self) -> None:
@@ -296,7 +294,7 @@ class Renderer:
             -ndc[0] * shot.width,
             -ndc[1] * shot.height,
         )
-        self._hold_geometry(shot.scene)
+        self._hold_geometry(shot.scene, self._gbuffer.has_tangents)
         self._gbuffer.draw(self._pick_target, frame, window)
         surface = np.frombuffer(
             self._pick_target.read(components=4, dtype="f4"), dtype=np.float32
@@ -340,7 +338,7 @@ class Renderer:
         ValueError
             If a shape is wrong.
         """
-        check_technique(settings.technique)
+        technique = find_technique(settings.technique)
         arrays = {}
         for name, values, width in (
             ("position", position, 3),
@@ -362,10 +360,9 @@ class Renderer:
             zero = np.zeros((count, 3), dtype=np.float32)
             return {"specular": zero, "diffuse": zero.copy()}
         self._hold_lights(scene, needs)
-        self._lighting.load_tables()
-        specular, diffuse = self._lighting.probe(
-            needs, arrays["position"], arrays["normal"], arrays["view"], arrays["alpha"]
-        )
+        if technique.has_tables:
+            self._lighting.load_tables()
+        specular, diffuse = self._lighting.probe(needs, settings.technique, **arrays)
         return {"specular": specular, "diffuse": diffuse}
 
     def timings(self, *, wait: bool = True) -> dict[str, float]:
@@ -462,7 +459,7 @@ class Renderer:
         If that fails, the last picture stays, and the next call starts again.
         """
         start = time.perf_counter()
-        check_technique(shot.settings.technique)
+        find_technique(shot.settings.technique)
         side = max(shot.width, shot.height)
         if side > self.limits.texture_side:
             raise InputError(
@@ -470,20 +467,22 @@ class Renderer:
                 f"expected at most {self.limits.texture_side} pixels a side"
             )
         scene = shot.scene
-        needs = self._needs_of(scene, samples)
+        needs = self._needs_of(scene, samples, shot.settings.technique)
         features = needs.lighting
         self._stale = True
         for spec in needs.programs:
             self.programs.get(spec)
         if features.lit:
-            self._hold_geometry(scene)
+            self._hold_geometry(scene, features.tangents)
             self._hold_lights(scene, features.lights)
         if features.shades:
             self._hold_materials(scene, features.uniform_materials)
-        if features.specular:
+        if features.reads_tables:
             self._lighting.load_tables()
         self._lighting.drop(
-            lights=not features.lit, materials=not features.shades, tables=not features.specular
+            lights=not features.lit,
+            materials=not features.shades,
+            tables=not features.reads_tables,
         )
         if not features.lit:
             self._gbuffer.release()
@@ -502,17 +501,17 @@ class Renderer:
         self._displayed = None
         self._cpu_ms = 1e3 * (time.perf_counter() - start)
 
-    def _needs_of(self, scene: Scene, samples: int) -> Needs:
+    def _needs_of(self, scene: Scene, samples: int, technique: str) -> Needs:
         """Return `needs_of`, from the last time if nothing that it depends on is new."""
         if self._needs is not None and self._seen is not None and not self._stale:
-            seen = self._seen.shot.scene
-            same = all(
+            seen, settings = self._seen.shot.scene, self._seen.shot.settings
+            same = settings.technique == technique and all(
                 getattr(seen, part) is getattr(scene, part)
                 for part in ("materials", "objects", "lights")
             )
             if same and self._needs.lighting.accumulates == (samples > 1):
                 return self._needs
-        return needs_of(scene, samples, self.limits)
+        return needs_of(scene, samples, self.limits, technique)
 
     def _add_sample(self) -> None:
         assert self._seen is not None
@@ -526,13 +525,15 @@ class Renderer:
             frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
             offset = pixel_offset(self._samples)
             window = (1.0, 1.0, -2.0 * offset[0] / shot.width, -2.0 * offset[1] / shot.height)
-            surfaces = self._targets.framebuffer("gbuffer", depth=True)
+            names = ("gbuffer", "tangents") if needs.lighting.tangents else ("gbuffer",)
+            surfaces = self._targets.framebuffer(*names, depth=True)
             with self._timers.measure("gbuffer"):
                 self._gbuffer.draw(surfaces, frame, window)
             with self._timers.measure("lighting"):
                 self._lighting.draw(
                     target,
                     self._targets.texture("gbuffer"),
+                    self._targets.texture("tangents") if needs.lighting.tangents else None,
                     needs.lighting,
                     frame,
                     offset,
@@ -548,10 +549,14 @@ class Renderer:
         self._displayed = None
         self._cpu_ms = 1e3 * (time.perf_counter() - start)
 
-    def _hold_geometry(self, scene: Scene) -> None:
+    def _hold_geometry(self, scene: Scene, tangents: bool) -> None:
         held = self._held
-        if held is None or held.objects is not scene.objects:
-            self._gbuffer.set_objects(scene.objects)
+        if (
+            held is None
+            or held.objects is not scene.objects
+            or self._gbuffer.has_tangents != tangents
+        ):
+            self._gbuffer.set_objects(scene.objects, tangents)
         if held is None or held.lights is not scene.lights:
             self._gbuffer.set_lights(scene.lights)
         self._held = scene

@@ -6,7 +6,11 @@
 #include "passes/light_storage.glsl"
 #if HAS_SPECULAR || HAS_DIFFUSE
 #include "passes/material_storage.glsl"
+#if TECHNIQUE_GGX
+#include "ggx/shade.glsl"
+#else
 #include "ltc/shade.glsl"
+#endif
 #endif
 
 uniform sampler2D surfaces;
@@ -23,9 +27,27 @@ uniform vec3 ray_corner;
 uniform vec3 ray_dx;
 uniform vec3 ray_dy;
 uniform int light_count;
-#if HAS_SPECULAR
+#if HAS_SPECULAR && !TECHNIQUE_GGX
 uniform sampler2D table_residual;
 uniform sampler2D table_albedo;
+#endif
+#if HAS_TANGENTS
+uniform sampler2D tangents;
+
+// The material's own tangent: the mesh's, bent into the surface and turned about the normal.
+vec3 material_tangent(ivec2 pixel, vec3 normal, float rotation)
+{
+    vec3 t = direction_from_octahedral(texelFetch(tangents, pixel, 0).xy);
+    t = normalize(t - normal * dot(normal, t));
+    return cos(rotation) * t + sin(rotation) * cross(normal, t);
+}
+#elif TECHNIQUE_GGX
+// Any tangent will do where no lobe has a direction.
+vec3 material_tangent(ivec2 pixel, vec3 normal, float rotation)
+{
+    vec3 axis = abs(normal.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
+    return normalize(cross(normal, axis));
+}
 #endif
 
 // Interpolated normals may turn away at silhouettes, where the surface itself does
@@ -44,11 +66,17 @@ vec3 surface_radiance(vec4 surface)
     vec3 normal = facing_normal(direction_from_octahedral(surface.xy), wo);
     vec3 position = eye + surface.z * ray;
     MaterialSample material = material_of_object(int(surface.w));
+#if TECHNIQUE_GGX
+    float rotation = material_rotation_of_object(int(surface.w));
+    vec3 tangent = material_tangent(ivec2(gl_FragCoord.xy), normal, rotation);
+    return shade_lights(light_count, position, normal, tangent, wo, material);
+#else
     return shade_lights(
 #if HAS_SPECULAR
         table_residual, table_albedo,
 #endif
         light_count, position, normal, wo, material);
+#endif
 }
 #endif
 

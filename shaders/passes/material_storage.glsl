@@ -26,3 +26,9 @@ MaterialSample material_of_object(int object)
     return unpack_material(
         material_texel(3 * object), material_texel(3 * object + 1), material_texel(3 * object + 2));
 }
+
+// How far the material's tangent is turned about the normal [rad].
+float material_rotation_of_object(int object)
+{
+    return material_texel(3 * object).w;
+}

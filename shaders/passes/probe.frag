@@ -1,14 +1,22 @@
 // The lighting pass's own shading at given points, for a white material.
 
 #include "passes/light_storage.glsl"
+#if TECHNIQUE_GGX
+#include "ggx/shade.glsl"
+#else
 #include "ltc/shade.glsl"
+#endif
 
 uniform sampler2D positions;  // world [m]
 uniform sampler2D normals;    // unit
 uniform sampler2D views;      // unit, to the viewer
 uniform sampler2D alphas;     // (alpha_x, alpha_y)
+#if TECHNIQUE_GGX
+uniform sampler2D tangents;   // unit, perpendicular to the normal
+#else
 uniform sampler2D table_residual;
 uniform sampler2D table_albedo;
+#endif
 uniform int light_count;
 
 layout(location = 0) out vec4 specular;
@@ -17,13 +25,20 @@ layout(location = 1) out vec4 diffuse;
 void main()
 {
     ivec2 place = ivec2(gl_FragCoord.xy);
+    vec3 position = texelFetch(positions, place, 0).xyz;
+    vec3 normal = texelFetch(normals, place, 0).xyz;
+    vec3 wo = texelFetch(views, place, 0).xyz;
+    vec2 alpha = texelFetch(alphas, place, 0).xy;
     vec3 specular_radiance;
     vec3 diffuse_radiance;
-    probe_lights(
-        table_residual, table_albedo, light_count,
-        texelFetch(positions, place, 0).xyz, texelFetch(normals, place, 0).xyz,
-        texelFetch(views, place, 0).xyz, texelFetch(alphas, place, 0).xy,
-        specular_radiance, diffuse_radiance);
+#if TECHNIQUE_GGX
+    vec3 tangent = texelFetch(tangents, place, 0).xyz;
+    probe_lights(light_count, position, normal, tangent, wo, alpha,
+                 specular_radiance, diffuse_radiance);
+#else
+    probe_lights(table_residual, table_albedo, light_count, position, normal, wo, alpha,
+                 specular_radiance, diffuse_radiance);
+#endif
     specular = vec4(specular_radiance, 0.0);
     diffuse = vec4(diffuse_radiance, 0.0);
 }

@@ -11,7 +11,7 @@ from app.render.features import LightingFeatures, Limits
 from app.render.lighting import lighting_spec
 from app.render.plan import Plan, make_plan, needs_of
 from app.render.programs import ProgramSpec, shader_roots
-from app.render.techniques import TECHNIQUES, check_technique
+from app.render.techniques import TECHNIQUES, find_technique
 from app.scene import (
     AreaLight,
     Material,
@@ -173,7 +173,7 @@ def test_equal_features_are_equal_keys() -> None:
 
 
 def test_techniques() -> None:
-    check_technique("ltc")
-    assert all(description and "\n" not in description for description in TECHNIQUES.values())
+    find_technique("ltc")
+    assert all(description and "\n" not in description for description in (t.description for t in TECHNIQUES.values()))
     with pytest.raises(InputError, match=r"technique 'lct' is unknown.*did you mean 'ltc'"):
-        check_technique("lct")
+        find_technique("lct")
