@@ -35,15 +35,16 @@ uniform sampler2D table_albedo;
 uniform sampler2D tangents;
 
 // The material's own tangent: the mesh's, bent into the surface and turned about the normal.
-vec3 material_tangent(ivec2 pixel, vec3 normal, float rotation)
+vec3 material_tangent(ivec2 pixel, vec3 normal, int object)
 {
     vec3 t = direction_from_octahedral(texelFetch(tangents, pixel, 0).xy);
     t = normalize(t - normal * dot(normal, t));
+    float rotation = material_rotation_of_object(object);
     return cos(rotation) * t + sin(rotation) * cross(normal, t);
 }
 #elif TECHNIQUE_GGX
 // Any tangent will do where no lobe has a direction.
-vec3 material_tangent(ivec2 pixel, vec3 normal, float rotation)
+vec3 material_tangent(ivec2 pixel, vec3 normal, int object)
 {
     vec3 axis = abs(normal.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
     return normalize(cross(normal, axis));
@@ -67,8 +68,7 @@ vec3 surface_radiance(vec4 surface)
     vec3 position = eye + surface.z * ray;
     MaterialSample material = material_of_object(int(surface.w));
 #if TECHNIQUE_GGX
-    float rotation = material_rotation_of_object(int(surface.w));
-    vec3 tangent = material_tangent(ivec2(gl_FragCoord.xy), normal, rotation);
+    vec3 tangent = material_tangent(ivec2(gl_FragCoord.xy), normal, int(surface.w));
     return shade_lights(light_count, position, normal, tangent, wo, material);
 #else
     return shade_lights(

@@ -27,8 +27,10 @@ MaterialSample material_of_object(int object)
         material_texel(3 * object), material_texel(3 * object + 1), material_texel(3 * object + 2));
 }
 
+#if HAS_TANGENTS
 // How far the material's tangent is turned about the normal [rad].
 float material_rotation_of_object(int object)
 {
     return material_texel(3 * object).w;
 }
+#endif
