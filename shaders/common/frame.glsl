@@ -1,5 +1,12 @@
-// The shading frame of an isotropic material.
+// Shading frames.
 // Twin: tests/gl/test_twins.py holds the float64 definition.
+
+// Some unit vector perpendicular to the normal.
+vec3 any_tangent(vec3 normal)
+{
+    vec3 axis = abs(normal.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
+    return normalize(axis - normal * dot(normal, axis));
+}
 
 struct ViewFrame {
     mat3 world_from_shading;  // columns x, y, z: z the normal, the view at x >= 0
@@ -21,12 +28,7 @@ ViewFrame view_aligned_frame(vec3 normal, vec3 wo)
     x -= normal * dot(normal, x);
     float x2 = dot(x, x);
     float sin_theta = sqrt(x2);
-    if (x2 < 1e-14) {
-        vec3 axis = abs(normal.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
-        x = axis - normal * dot(normal, axis);
-        x2 = dot(x, x);
-    }
-    x *= inversesqrt(x2);
+    x = x2 < 1e-14 ? any_tangent(normal) : x * inversesqrt(x2);
     return ViewFrame(
         mat3(x, cross(normal, x), normal), min(sin_theta, 1.0), clamp(cos_theta, 0.0, 1.0));
 }

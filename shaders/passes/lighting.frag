@@ -6,6 +6,7 @@
 #include "passes/light_storage.glsl"
 #if HAS_SPECULAR || HAS_DIFFUSE
 #include "passes/material_storage.glsl"
+#include "common/frame.glsl"
 #if TECHNIQUE_GGX
 #include "ggx/shade.glsl"
 #else
@@ -38,16 +39,17 @@ uniform sampler2D tangents;
 vec3 material_tangent(ivec2 pixel, vec3 normal, int object)
 {
     vec3 t = direction_from_octahedral(texelFetch(tangents, pixel, 0).xy);
-    t = normalize(t - normal * dot(normal, t));
+    t -= normal * dot(normal, t);
+    float t2 = dot(t, t);
+    // At a pole of the mesh's tangents they interpolate to nothing: 0, or no number.
+    t = t2 > 1e-8 ? t * inversesqrt(t2) : any_tangent(normal);
     float rotation = material_rotation_of_object(object);
     return cos(rotation) * t + sin(rotation) * cross(normal, t);
 }
 #elif TECHNIQUE_GGX
-// Any tangent will do where no lobe has a direction.
 vec3 material_tangent(ivec2 pixel, vec3 normal, int object)
 {
-    vec3 axis = abs(normal.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
-    return normalize(cross(normal, axis));
+    return any_tangent(normal);
 }
 #endif
 
