@@ -112,6 +112,7 @@ def test_materials(ctx: moderngl.Context, tmp_path: Path, uniform_texels: int) -
     storage = TexelStorage(ctx, "material", "Materials")
     storage.update(pack_materials(MATERIALS), uniform_texels)
     features = {
+        "HAS_TANGENTS": 0,
         "MATERIAL_STORAGE_UNIFORM": int(uniform_texels > 0),
         "MATERIAL_TEXELS": uniform_texels,
         "STORAGE_TEXTURE_WIDTH": 1024,

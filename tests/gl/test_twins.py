@@ -327,3 +327,36 @@ def test_cosine_light_pins_small_lights(glsl):
     far = f32(distance) > np.sqrt(2.0 / 0.01)
     np.testing.assert_allclose(got[far], 1.0 / f32(distance)[far] ** 2, rtol=1e-6)
     assert not got[~far].any()
+
+
+def test_view_aligned_frame(glsl):
+    """Orthonormal, right-handed, the view at x >= 0; also along and below the normal."""
+    rng = np.random.default_rng(13)
+    n = rng.normal(size=(COUNT, 3))
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    side = np.cross(n, rng.normal(size=(COUNT, 3)))
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    theta = 10 ** rng.uniform(-9, np.log10(2.0), COUNT)  # up to 115 degrees
+    theta[:8] = 0.0
+    wo = np.cos(theta)[:, None] * n + np.sin(theta)[:, None] * side
+    inputs = {"n": f32(n), "wo": f32(wo)}
+    columns = [
+        glsl("common/frame.glsl", f"result.xyz = view_aligned_frame(n, wo).{what};", inputs)[:, :3]
+        for what in ("world_from_shading[0]", "world_from_shading[1]", "world_from_shading[2]")
+    ]
+    x, y, z = columns
+    np.testing.assert_array_equal(z, f32(n))
+    np.testing.assert_allclose(np.cross(z, x), y, atol=3e-7)
+    for a, b in ((x, y), (y, z), (z, x)):
+        np.testing.assert_allclose(np.sum(a * b, axis=1), 0.0, atol=3e-7)
+    np.testing.assert_allclose(np.linalg.norm(x, axis=1), 1.0, atol=3e-7)
+    away = theta > 1e-4
+    np.testing.assert_allclose(x[away], side[away], atol=2e-3)
+    np.testing.assert_allclose(x[theta > 0.01], side[theta > 0.01], atol=2e-5)
+    angles = glsl(
+        "common/frame.glsl",
+        "ViewFrame f = view_aligned_frame(n, wo); result.xy = vec2(f.sin_theta, f.cos_theta);",
+        inputs,
+    )
+    np.testing.assert_allclose(angles[:, 0], np.sin(theta), atol=3e-7)
+    np.testing.assert_allclose(angles[:, 1], np.maximum(np.cos(theta), 0.0), atol=3e-7)
