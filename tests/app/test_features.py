@@ -174,6 +174,9 @@ def test_equal_features_are_equal_keys() -> None:
 
 def test_techniques() -> None:
     find_technique("ltc")
-    assert all(description and "\n" not in description for description in (t.description for t in TECHNIQUES.values()))
+    assert all(
+        description and "\n" not in description
+        for description in (t.description for t in TECHNIQUES.values())
+    )
     with pytest.raises(InputError, match=r"technique 'lct' is unknown.*did you mean 'ltc'"):
         find_technique("lct")
