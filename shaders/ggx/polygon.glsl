@@ -1,0 +1,275 @@
+// GGX over a planar light: the exact share of visible normals that reflect the viewer into it,
+// times the mean of G2/G1 (and of Schlick's Fresnel term) on a fan. Twin: ltc.ggx.
+//
+// Lights that are small against the lobe are pinned to their centre, like in
+// ltc/polygon.glsl: what would cancel is summed exactly as an area.
+
+#include "ltc/contour.glsl"
+#include "ggx/edge.glsl"
+
+// The integrand apart from what is exact: (density, G2/G1, (1 - wo.h)^5 G2/G1) at a half
+// vector of any length. The density is 2 k / (pi (|bent| + bent.z)) short of its scale.
+vec3 ggx_weights(vec3 h, GgxView view)
+{
+    float h2 = max(dot(h, h), 1e-30);
+    float v_h = max(dot(view.bent, h), 0.0);
+    vec3 m = view.alpha * h;
+    float m2 = max(dot(m, m), 1e-30);
+    float scale = 2.0 * v_h / m2;
+    float zo = view.wo.z;
+    float zi = max(scale * m.z - zo, 0.0);
+    vec2 bent_i = view.alpha.xy * (scale * m.xy - view.wo.xy);
+    float length_i = sqrt(dot(bent_i, bent_i) + zi * zi);
+    float smith = zi * (zo + view.bent_length) /
+                  max(zi * view.bent_length + zo * length_i, 1e-30);
+    float x = max(1.0 - v_h * inversesqrt(m2), 0.0);
+    float x2 = x * x;
+    return vec3(v_h / (h2 * h2), smith, smith * (x2 * x2 * x));
+}
+
+// Sums over the nodes of a fan from the mean half vector.
+struct FanSum {
+    float density;
+    vec2 away;      // density times the difference of both weights from the centre's
+};
+
+void add_fan_node(vec3 u, vec3 du, vec3 center, vec3 at_center, GgxView view, inout FanSum sum)
+{
+    vec3 chord = u - center;
+    float k = dot(center, cross(chord, du));
+#if GGX_NODES == 2
+    vec3 at = ggx_weights(center + 0.75 * chord, view);
+    float density = 0.888888889 * k * at.x;
+    sum.density += density + 0.111111111 * k * at_center.x;
+    sum.away += density * (at.yz - at_center.yz);
+#else
+    vec3 at = ggx_weights(center + 0.355051026 * chord, view);
+    float density = 0.363917237 * k * at.x;
+    sum.density += density;
+    sum.away += density * (at.yz - at_center.yz);
+    at = ggx_weights(center + 0.844948974 * chord, view);
+    density = 0.636082763 * k * at.x;
+    sum.density += density;
+    sum.away += density * (at.yz - at_center.yz);
+#endif
+}
+
+// Nodes at equal weights of Gauss and Legendre in psi.
+void add_fan_edge(
+    HalfVectorEdge edge, vec3 center, vec3 at_center, GgxView view, inout FanSum sum)
+{
+    vec3 b = edge.cone.b;
+    mat3 axes = mat3(edge.cone.w1, edge.cone.w2, edge.cone.w3);
+    vec2 inverse = 1.0 / (b.xy + b.z);
+    vec2 radii = sqrt(b.z * inverse);
+    vec2 heights = b.xy * inverse;
+#if GGX_NODES == 2
+    const int count = 2;
+    const float first = 0.211324865;
+    const float apart = 0.577350269;
+#else
+    const int count = 3;
+    const float first = 0.112701665;
+    const float apart = 0.387298335;
+#endif
+    for (int i = 0; i < count; ++i) {
+        float angle = edge.sweep * (first + float(i) * apart);
+        vec2 turn = vec2(cos(angle), sin(angle));
+        vec2 c = vec2(edge.start.x * turn.x - edge.start.y * turn.y,
+                      edge.start.y * turn.x + edge.start.x * turn.y);
+        float height = sqrt(dot(heights, c * c));
+        float slope = (heights.y - heights.x) * c.x * c.y / max(height, 1e-15);
+#if GGX_NODES == 2
+        float weight = 0.5;
+#else
+        float weight = i == 1 ? 0.444444444 : 0.277777778;
+#endif
+        add_fan_node(axes * vec3(radii * c, height),
+                     (weight * edge.sweep) *
+                         (axes * vec3(-radii.x * c.y, radii.y * c.x, slope)),
+                     center, at_center, view, sum);
+    }
+}
+
+// A light about its centre of perspective, directions as differences from that centre's.
+struct GgxLight {
+    CosineLight placed;   // in the tangent frame
+    vec3 toward;          // unit, to placed.center
+    float distance;       // to it
+    vec3 half_vector;     // h' of it
+};
+
+GgxLight ggx_light(PlanarLight light, PlaneView plane, mat3 tangent_from_world, GgxView view)
+{
+    GgxLight result;
+    CosineTransform transform = CosineTransform(tangent_from_world, tangent_from_world);
+    result.placed = cosine_light(transform, light, plane);
+    if (result.placed.pin > 0.0) {
+        result.distance = length(result.placed.center);
+        result.toward = result.placed.center / result.distance;
+    } else {
+        result.distance = abs(plane.depth);
+        result.toward = tangent_from_world * (plane.depth < 0.0 ? -light.n : light.n);
+    }
+    result.half_vector = (view.wo + result.toward) * view.inverse_alpha;
+    return result;
+}
+
+// Unit direction to center + dp as a difference from the direction to the centre.
+vec3 direction_difference(GgxLight light, vec3 dp, float distance)
+{
+    vec3 way = 2.0 * light.placed.center + dp;
+    return (dp - light.toward * (dot(dp, way) / (light.distance + distance))) /
+           max(distance, 1e-30);
+}
+
+vec3 edge_normal(CosineLight light, PlanarEdge edge)
+{
+    return edge.d.x * light.center_cross_u + edge.d.y * light.center_cross_v +
+           edge.moment * light.u_cross_v;
+}
+
+// Whether the outline spans so little of the lobe that one point of it stands for all.
+bool is_pinned(PlanarLight light, GgxLight about, GgxView view)
+{
+    float inverse = max(view.inverse_alpha.x, view.inverse_alpha.y);
+    float extent = light.radius * max(inverse, 1.0) / about.distance;
+    return about.placed.pin > 0.0 &&
+           extent * extent < 1e-3 * dot(about.half_vector, about.half_vector);
+}
+
+struct PinnedSum {
+    vec3 solid;   // of r x dr (1/|r|^2 - 1/|c|^2)
+    vec3 lobe;    // of ((v + o) x do) (1/|h'|^2 - 1/|hc|^2)
+    float area;   // twice the clipped area in (s, t)
+};
+
+// Two Gauss-Legendre nodes: the outline is within 3 % of the lobe's width.
+void add_pinned_edge(GgxLight light, PlanarEdge edge, GgxView view, inout PinnedSum sum)
+{
+    vec3 u = light.placed.u;
+    vec3 v = light.placed.v;
+    vec3 w = edge_normal(light.placed, edge);
+    vec3 d = edge.d.x * u + edge.d.y * v;
+    float c2 = light.distance * light.distance;
+    vec3 hc = light.half_vector;
+    float hc2 = dot(hc, hc);
+    sum.area += edge.moment;
+    for (int i = 0; i < 2; ++i) {
+        vec2 st = 0.5 * (edge.a + edge.b) + (i == 0 ? -0.288675135 : 0.288675135) * edge.d;
+        vec3 dp = st.x * u + st.y * v;
+        vec3 r = light.placed.center + dp;
+        float r2 = dot(r, r);
+        float distance = sqrt(r2);
+        sum.solid -= 0.5 * w * (dot(2.0 * light.placed.center + dp, dp) / (r2 * c2));
+        vec3 difference = direction_difference(light, dp, distance);
+        vec3 o = light.toward + difference;
+        vec3 q = difference * view.inverse_alpha;
+        vec3 h = hc + q;
+        vec3 rate = (d - o * dot(o, d)) / distance;
+        float excess = dot(2.0 * hc + q, q) / (dot(h, h) * hc2);
+        sum.lobe -= (0.5 * excess) * cross(view.wo + o, rate);
+    }
+}
+
+// The contour's sum of (h' x dh')/|h'|^2.
+vec3 pinned_vector(GgxLight light, PinnedSum sum, GgxView view)
+{
+    vec3 hc = light.half_vector;
+    vec3 a = view.inverse_alpha;
+    float c2 = light.distance * light.distance;
+    vec3 solid = sum.solid + (sum.area / c2) * light.placed.u_cross_v;
+    return vec3(a.y, a.x, a.x * a.y) * (solid / dot(hc, hc) + sum.lobe);
+}
+
+// The closed form over an edge of the clipped outline; false if it has no width.
+bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdge result)
+{
+    vec3 u = light.placed.u;
+    vec3 v = light.placed.v;
+    vec3 w = edge_normal(light.placed, edge);
+    float w2 = dot(w, w);
+    if (w2 < 1e-36) {
+        return false;
+    }
+    vec3 dp = edge.a.x * u + edge.a.y * v;
+    vec3 d = edge.d.x * u + edge.d.y * v;
+    vec3 p = light.placed.center + dp;
+    vec3 q = light.placed.center + edge.b.x * u + edge.b.y * v;
+    float length_p = length(p);
+    float length_q = max(length(q), 1e-30);
+    vec3 difference = direction_difference(light, dp, length_p);
+    vec3 o = light.toward + difference;
+    vec3 move = (d - o * (dot(d, p + q) / (length_p + length_q))) / length_q;
+    result = half_vector_edge(light.half_vector + difference * view.inverse_alpha,
+                              move * view.inverse_alpha, w * inversesqrt(w2), view);
+    return true;
+}
+
+// Integrals for F = 1 and with the weight (1 - wo.h)^5, light radiance 1.
+vec2 ggx_light_specular(
+    PlanarLight light, PlaneView plane, vec3 normal, mat3 tangent_from_world, GgxView view)
+{
+    GgxLight about = ggx_light(light, plane, tangent_from_world, view);
+    float winding = light_winding(plane);
+    float scale = 1.0 / (3.14159265359 * (view.bent_length + view.bent.z));
+    bool pinned = is_pinned(light, about, view);
+    PinnedSum pinned_sum = PinnedSum(vec3(0.0), vec3(0.0), 0.0);
+    vec3 vector = vec3(0.0);
+    vec3 center = vec3(0.0);
+    vec3 at_center = vec3(0.0);
+    float share = 0.0;
+    FanSum fan = FanSum(0.0, vec2(0.0));
+    // First the outline's sum, which holds the fan's centre, then the fan.
+#if GGX_NODES == 1
+    const int rounds = 1;
+#else
+    const int rounds = 2;
+#endif
+    for (int round = 0; round < rounds; ++round) {
+        Contour contour = contour_start(light, plane, about.placed, normal);
+        while (!contour_ends(light, contour)) {
+            PlanarEdge planar;
+            if (!contour_edge(light, about.placed, contour, planar)) {
+                continue;
+            }
+            if (pinned) {
+                add_pinned_edge(about, planar, view, pinned_sum);
+                continue;
+            }
+            HalfVectorEdge edge;
+            if (light_edge(about, planar, view, edge)) {
+#if GGX_NODES == 1
+                vector += edge.integral;
+#else
+                if (round == 0) {
+                    vector += edge.integral;
+                } else {
+                    add_fan_edge(edge, center, at_center, view, fan);
+                }
+#endif
+            }
+        }
+        if (round == 0) {
+            vector = pinned ? pinned_vector(about, pinned_sum, view) : vector;
+            vector *= winding;
+            share = min(scale * dot(vector, view.bent), 1.0);
+            float length2 = dot(vector, vector);
+            // Nothing lit, or no more than rounding.
+            if (!(share > 0.0) || length2 < 1e-36) {
+                return vec2(0.0);
+            }
+            center = pinned ? normalize(about.half_vector) : vector * inversesqrt(length2);
+            at_center = ggx_weights(center, view);
+            if (pinned) {
+                return share * at_center.yz;
+            }
+        }
+    }
+    vec2 mean = at_center.yz;
+#if GGX_NODES > 1
+    float whole = scale * winding;
+    mean += fan.away * (whole / max(abs(whole * fan.density), share));
+#endif
+    return share * clamp(mean, 0.0, 1.0);
+}

@@ -1,0 +1,90 @@
+// Technique `ggx`: what all lights send to the eye from one surface point, isotropic or
+// anisotropic, without tables. Specular by ggx/polygon.glsl, Lambert by ltc/contour.glsl.
+// Twin: ltc.ggx.ggx_specular.
+
+#include "common/frame.glsl"
+#include "common/light_data.glsl"
+#include "common/material.glsl"
+#include "ltc/contour.glsl"
+#if HAS_SPECULAR
+#include "ggx/polygon.glsl"
+#endif
+
+// Integrals of a light of radiance 1 at a point.
+struct GgxTerms {
+    vec2 specular;  // for F = 1, and with the weight (1 - wo.h)^5
+    float diffuse;  // form factor
+};
+
+GgxTerms ggx_terms(
+    PlanarLight light, vec3 position, mat3 world_from_tangent, vec3 wo_tangent, vec2 alpha)
+{
+    GgxTerms terms = GgxTerms(vec2(0.0), 0.0);
+    vec3 normal = world_from_tangent[2];
+    PlaneView plane = plane_view(light, position);
+    if (is_unseen(light, plane, normal)) {
+        return terms;
+    }
+    mat3 tangent_from_world = transpose(world_from_tangent);
+#if HAS_SPECULAR
+    if (wo_tangent.z > 0.0) {
+        terms.specular = ggx_light_specular(
+            light, plane, normal, tangent_from_world, ggx_view(wo_tangent, alpha));
+    }
+#endif
+#if HAS_DIFFUSE
+    CosineTransform diffuse = CosineTransform(tangent_from_world, tangent_from_world);
+    terms.diffuse =
+        max(0.0, light_winding(plane) * light_form_factor(light, diffuse, plane, normal));
+#endif
+    return terms;
+}
+
+// Columns: the tangent made perpendicular to the normal, the bitangent, the normal.
+mat3 tangent_frame(vec3 normal, vec3 tangent)
+{
+    vec3 x = tangent - normal * dot(normal, tangent);
+    float x2 = dot(x, x);
+    x = x2 > 1e-12 ? x * inversesqrt(x2) : any_tangent(normal);
+    return mat3(x, cross(normal, x), normal);
+}
+
+// Radiance towards wo. `normal`, `tangent` and `wo` are unit and leave the surface; alpha.x
+// acts along the tangent.
+vec3 shade_lights(
+    int light_count, vec3 position, vec3 normal, vec3 tangent, vec3 wo, MaterialSample material)
+{
+    mat3 world_from_tangent = tangent_frame(normal, tangent);
+    vec3 wo_tangent = wo * world_from_tangent;
+    // f0 = 0 means no specular lobe at all, as in scenes that leave it out.
+    float has_lobe = material.f0 == vec3(0.0) ? 0.0 : 1.0;
+    vec3 radiance = vec3(0.0);
+    for (int i = 0; i < light_count; ++i) {
+        PlanarLight light = light_at(i);
+        GgxTerms terms =
+            ggx_terms(light, position, world_from_tangent, wo_tangent, material.alpha);
+        vec3 specular =
+            material.f0 * (terms.specular.x - terms.specular.y) + has_lobe * terms.specular.y;
+        radiance += light.radiance * (specular + material.diffuse * terms.diffuse);
+    }
+    return radiance;
+}
+
+#if PROBES
+// The two parts apart, for a white material: F = 1 and albedo 1.
+void probe_lights(
+    int light_count, vec3 position, vec3 normal, vec3 tangent, vec3 wo, vec2 alpha,
+    out vec3 specular, out vec3 diffuse)
+{
+    mat3 world_from_tangent = tangent_frame(normal, tangent);
+    vec3 wo_tangent = wo * world_from_tangent;
+    specular = vec3(0.0);
+    diffuse = vec3(0.0);
+    for (int i = 0; i < light_count; ++i) {
+        PlanarLight light = light_at(i);
+        GgxTerms terms = ggx_terms(light, position, world_from_tangent, wo_tangent, alpha);
+        specular += light.radiance * terms.specular.x;
+        diffuse += light.radiance * terms.diffuse;
+    }
+}
+#endif
