@@ -213,7 +213,9 @@ class LightingFeatures:
 
 def technique_defines(technique: str) -> dict[str, int]:
     """Return the numbers that choose a technique's shaders."""
-    return {"TECHNIQUE_GGX": int(technique == "ggx"), "GGX_NODES": 2}
+    if technique == "ggx":
+        return {"TECHNIQUE_GGX": 1, "GGX_NODES": 2}
+    return {"TECHNIQUE_GGX": 0}
 
 
 def probe_defines(lights: LightNeeds, technique: str) -> dict[str, int]:
