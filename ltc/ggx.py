@@ -298,6 +298,33 @@ def edge_integral(
     return _edge(p, q, v, D).integral
 
 
+def _lit_edges(loop: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return starts and ends, (..., 2N, 3), of a loop's edges above the horizon.
+
+    Then those that close it: the first crossing with the second, the third with the
+    fourth, as ``shaders/ltc/contour.glsl`` meets them. `ltc.polygon.clip_to_horizon` closes with
+    other edges, whose integrals sum to the same but whose nodes lie elsewhere. Edges
+    that are missing are points.
+    """
+    p = np.asarray(loop, dtype=np.float64)
+    clipped = clip_to_horizon(p)
+    starts, ends = clipped[..., 0::2, :], clipped[..., 1::2, :]
+    above = p[..., 2] > 0.0
+    crosses = above != np.roll(above, -1, axis=-1)
+    crossing = np.where(above[..., None], ends, starts)
+    index = np.where(crosses, np.arange(p.shape[-2]), -1)
+    before = np.maximum.accumulate(index, axis=-1)
+    before = np.roll(before, 1, axis=-1)
+    before[..., 0] = -1
+    second = crosses & (np.cumsum(crosses, axis=-1) % 2 == 0)
+    pending = np.take_along_axis(crossing, np.maximum(before, 0)[..., None], axis=-2)
+    first = np.where(above[..., None], crossing, pending)
+    last = np.where(above[..., None], pending, crossing)
+    up = np.array([0.0, 0.0, 1.0])
+    first, last = (np.where(second[..., None], x, up) for x in (first, last))
+    return np.concatenate([starts, first], axis=-2), np.concatenate([ends, last], axis=-2)
+
+
 def _outline(
     loops: Sequence[npt.ArrayLike],
     wo: npt.ArrayLike,
@@ -306,8 +333,8 @@ def _outline(
 ) -> tuple[_Edge, FloatArray, FloatArray, BoolArray]:
     """Return the edges (..., E), v and D (..., 3), and where the viewer is above the surface."""
     v, D = _points("wo", wo), _stretch(alpha_x, alpha_y)
-    starts = [clip_to_horizon(loop) for loop in loops]
-    ends = [np.roll(start, -1, axis=-2) for start in starts]
+    lit = [_lit_edges(loop) for loop in loops]
+    starts, ends = [p for p, _ in lit], [q for _, q in lit]
     shape = np.broadcast_shapes(v.shape[:-1], D.shape[:-1], *(a.shape[:-2] for a in starts))
 
     def joined(parts: list[FloatArray]) -> FloatArray:
