@@ -37,6 +37,12 @@ TECHNIQUES: dict[str, Technique] = {
         anisotropic=False,
         has_tables=True,
     ),
+    "ggx": Technique(
+        "GGX itself as a contour integral in half-vector space, anisotropic, without tables; "
+        "Lambert diffuse",
+        anisotropic=True,
+        has_tables=False,
+    ),
 }
 """By name, in the order in which help lists them."""
 
