@@ -200,7 +200,11 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
     float length_q = max(length(q), 1e-30);
     vec3 difference = direction_difference(light, dp, length_p);
     vec3 o = light.toward + difference;
-    vec3 move = (d - o * (dot(d, p + q) / (length_p + length_q))) / length_q;
+    // o_q - o_p from the shorter end, divided by the longer: the other way round loses what
+    // their lengths differ by.
+    vec3 shorter = length_q < length_p ? q / length_q : o;
+    vec3 move = (d - shorter * (dot(d, p + q) / (length_p + length_q))) /
+                max(length_p, length_q);
     result = half_vector_edge(light.half_vector + difference * view.inverse_alpha,
                               move * view.inverse_alpha, w * inversesqrt(w2), view);
     return true;
