@@ -18,14 +18,8 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 from imgui_bundle import portable_file_dialogs as system_dialogs
 
-from app.panels.widgets import MUTED, button, hint, label
-
-FileType = tuple[str, tuple[str, ...]]
-"""A name for people, and the endings without a dot."""
-
-SCENES: FileType = ("Scenes", ("json",))
-MESHES: FileType = ("Meshes", ("glb", "gltf", "obj", "ply", "stl"))
-PICTURES: FileType = ("Pictures", ("png", "exr"))
+from app.documents import FileType
+from app.panels.widgets import MUTED, begin_modal, button, hint, label
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 
@@ -90,8 +84,8 @@ class FileDialogs:
 
 
 def _system_filter(kind: FileType) -> list[str]:
-    name, endings = kind
-    return [name, " ".join(f"*.{ending}" for ending in endings), "All files", "*"]
+    name, suffixes = kind
+    return [name, " ".join(f"*{suffix}" for suffix in suffixes), "All files", "*"]
 
 
 class _Browser:
@@ -110,14 +104,13 @@ class _Browser:
         self._folder, self._problem = folder, ""
         self._folders: list[Path] = []
         self._files: list[Path] = []
-        suffixes = {f".{ending}" for ending in self._kind[1]}
         try:
             for path in sorted(folder.iterdir(), key=lambda path: path.name.lower()):
                 if path.name.startswith("."):
                     continue
                 if path.is_dir():
                     self._folders.append(path)
-                elif path.suffix.lower() in suffixes:
+                elif path.suffix.lower() in self._kind[1]:
                     self._files.append(path)
         except OSError as failure:
             self._problem = failure.strerror or str(failure)
@@ -127,11 +120,7 @@ class _Browser:
         if self._is_new:
             imgui.open_popup(self._title)
             self._is_new = False
-        centre = imgui.get_main_viewport().get_center()
-        imgui.set_next_window_pos(centre, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
-        imgui.set_next_window_size(ImVec2(40.0 * em, 30.0 * em), imgui.Cond_.appearing)
-        opened, _ = imgui.begin_popup_modal(self._title, None, imgui.WindowFlags_.no_saved_settings)
-        if not opened:
+        if not begin_modal(self._title, 40.0, 30.0):
             return
         self._places()
         below = 2.0 * imgui.get_frame_height_with_spacing() + 2.8 * em

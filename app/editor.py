@@ -9,6 +9,7 @@ one step however many scenes it passes through: `begin`, `update` ...,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -210,6 +211,27 @@ class Editor:
             scene, self._drag = self._drag.scene, None
             self._show(replace(scene, camera=self._scene.camera))
 
+    def duplicate(self) -> None:
+        """Copy what is selected, as one step."""
+        self._edit_selected("Duplicate", duplicate_selected)
+
+    def remove(self) -> None:
+        """Remove what is selected, as one step.
+
+        Raises
+        ------
+        SceneError
+            If a light would keep fewer than three corners.
+        """
+        self._edit_selected("Remove", remove_selected)
+
+    def escape(self) -> None:
+        """Cancel a drag if there is one, else select nothing."""
+        if self._drag is not None:
+            self.cancel()
+        else:
+            self.selection = NOTHING
+
     # --- history ----------------------------------------------------------
 
     @property
@@ -275,6 +297,15 @@ class Editor:
     def _show(self, scene: Scene) -> None:
         self._scene = scene
         self._selection = self._selection.within(scene)
+
+    def _edit_selected(
+        self, verb: str, edit: Callable[[Scene, Selection], tuple[Scene, Selection]]
+    ) -> None:
+        scene, selection = edit(self._scene, self._selection)
+        if scene != self._scene:
+            corner = self._selection.vertex is not None
+            self.apply(f"{verb} corner" if corner else edits.describe(self._scene, scene), scene)
+            self.selection = selection
 
     def _record(self, name: str) -> bool:
         if same_but_camera(self._scene, self._history[self._position].scene):

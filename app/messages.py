@@ -1,14 +1,15 @@
-"""Messages in the window: short notes that pass, and failures that stay until read."""
+"""Messages to the user: short notes that pass, and failures that stay until read."""
 
 from __future__ import annotations
 
 import time
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
-from imgui_bundle import ImVec2, ImVec4, imgui
-from imgui_bundle import icons_fontawesome_4 as icons
-
-from app import theme
+from app.errors import InputError
+from app.scene import SceneError
 
 NOTE_SECONDS, FAILURE_SECONDS = 4.0, 12.0
 MOST = 4
@@ -25,7 +26,7 @@ class Message:
 
 
 class Messages:
-    """The messages shown at the moment."""
+    """The messages of the moment, oldest first."""
 
     def __init__(self) -> None:
         self._shown: list[Message] = []
@@ -46,43 +47,27 @@ class Messages:
         """Say what did not work; a click takes it away."""
         self._add(text, True, FAILURE_SECONDS)
 
+    def dismiss(self, message: Message) -> None:
+        """Take one message away."""
+        self._shown.remove(message)
+
+    def expire(self) -> None:
+        """Take those away whose time is over."""
+        now = time.monotonic()
+        self._shown = [message for message in self._shown if message.until > now]
+
+    @contextmanager
+    def guard(self) -> Iterator[None]:
+        """Do something for the user; say what did not work instead of ending the program."""
+        try:
+            yield
+        except (InputError, SceneError, OSError) as failure:
+            self.failure(str(failure))
+        except Exception as failure:
+            traceback.print_exc()
+            self.failure(f"Something went wrong: {failure}")
+
     def _add(self, text: str, is_failure: bool, seconds: float) -> None:
         kept = [message for message in self._shown if message.text != text]
         kept.append(Message(text, is_failure, time.monotonic() + seconds))
         self._shown = kept[-MOST:]
-
-    def draw(self, right: float, bottom: float) -> None:
-        """Draw the messages upwards from a corner in screen coordinates."""
-        now = time.monotonic()
-        self._shown = [message for message in self._shown if message.until > now]
-        em = imgui.get_font_size()
-        bottom -= em
-        for message in reversed(self.shown):
-            imgui.set_next_window_pos(
-                ImVec2(right - em, bottom), imgui.Cond_.always, ImVec2(1.0, 1.0)
-            )
-            imgui.set_next_window_bg_alpha(0.94)
-            imgui.push_style_color(imgui.Col_.window_bg, theme.grey(0.17))
-            imgui.push_style_var(imgui.StyleVar_.window_rounding, 6.0)
-            flags = (
-                imgui.WindowFlags_.no_decoration
-                | imgui.WindowFlags_.always_auto_resize
-                | imgui.WindowFlags_.no_saved_settings
-                | imgui.WindowFlags_.no_focus_on_appearing
-                | imgui.WindowFlags_.no_nav
-                | imgui.WindowFlags_.no_docking
-            )
-            imgui.begin(f"##message {message.text}", None, flags)
-            imgui.push_text_wrap_pos(em * 26.0)
-            icon = icons.ICON_FA_EXCLAMATION_TRIANGLE if message.is_failure else icons.ICON_FA_CHECK
-            colour: ImVec4 = theme.WARNING if message.is_failure else theme.ACCENT
-            imgui.text_colored(colour, icon)
-            imgui.same_line()
-            imgui.text_unformatted(message.text)
-            imgui.pop_text_wrap_pos()
-            if imgui.is_window_hovered() and imgui.is_mouse_clicked(imgui.MouseButton_.left):
-                self._shown.remove(message)
-            bottom -= imgui.get_window_height() + 0.4 * em
-            imgui.end()
-            imgui.pop_style_var()
-            imgui.pop_style_color()

@@ -34,6 +34,8 @@ from app.render.renderer import Hit, Renderer
 from app.scene import AreaLight, Camera, RenderSettings, Scene, SceneError, Shot, Vec2
 from app.vectors import add, length, mix, subtract
 
+STILL_SAMPLES = 32
+"""How many samples per pixel a still picture gathers unless told otherwise."""
 SLOW = 0.045
 """Seconds for a full-size sample from which on moving pictures are smaller."""
 SETTLE = 0.2
@@ -92,6 +94,7 @@ class Viewport:
     """
 
     def __init__(self, renderer: Renderer, reporter: Reporter) -> None:
+        self.settings = RenderSettings(samples=STILL_SAMPLES)
         self.tool = "move"
         self.show_overlays = True
         self.help = ""
@@ -156,13 +159,21 @@ class Viewport:
         aspect = max(self.view.width / self.view.height, control.LEAST_ASPECT)
         editor.look(control.frame(editor.scene.camera, *sphere, aspect))
 
-    def draw(self, editor: Editor, settings: RenderSettings) -> None:
+    def take(self, tool: str) -> None:
+        """Take the tool that moves or the one that rotates: "move", "rotate"."""
+        self.tool = tool
+
+    def toggle_overlays(self) -> None:
+        """Show or hide what lies over the picture: outlines, handles, help."""
+        self.show_overlays = not self.show_overlays
+
+    def draw(self, editor: Editor) -> None:
         """Draw one frame into the current Dear ImGui window."""
         self._place()
         if self.show_overlays and self._gizmo is None:
             self._handles(editor)
         self._canvas(editor)
-        self._render(editor.scene, settings)
+        self._render(editor.scene, self.settings)
         self._picture()
         self._is_asking = False
         if self.show_overlays:

@@ -1,12 +1,12 @@
-"""The form of the export dialog: kind, size and samples of a picture file."""
+"""The export dialog: kind, size and samples of a picture file, and how far it is."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
-from app.panels.widgets import choice, hint, label, tooltip
+from app.panels.widgets import begin_modal, button, choice, hint, label, tooltip
 from app.scene import MAX_IMAGE_SIDE
 
 SIZES: tuple[tuple[str, tuple[int, int]], ...] = (
@@ -32,6 +32,45 @@ class Export:
     width: int = 1920
     height: int = 1080
     samples: int = 64
+
+
+def export_dialog(export: Export, viewport: tuple[int, int], is_asked: bool) -> tuple[Export, bool]:
+    """Draw the dialog while it is open; return what was chosen and whether to go on with it.
+
+    Parameters
+    ----------
+    viewport : (int, int)
+        The picture's size on screen.
+    is_asked : bool
+        Open the dialog now.
+    """
+    title = "Export picture"
+    if is_asked:
+        imgui.open_popup(title)
+    if not begin_modal(title):
+        return export, False
+    export = export_form(export, viewport)
+    imgui.spacing()
+    width = 7.0 * imgui.get_font_size()
+    goes_on = button("Export…###choose file", width=width)
+    imgui.same_line()
+    if button("Cancel###cancel export", width=width) or goes_on:
+        imgui.close_current_popup()
+    imgui.end_popup()
+    return export, goes_on
+
+
+def export_progress(name: str, done: int, total: int) -> bool:
+    """Draw how many samples of a file are done and return whether to stop."""
+    stopped = False
+    imgui.open_popup("Exporting")
+    if begin_modal("Exporting"):
+        imgui.text(name)
+        size = ImVec2(20.0 * imgui.get_font_size(), 0.0)
+        imgui.progress_bar(done / total, size, f"{done} of {total} samples")
+        stopped = button("Stop###stop export")
+        imgui.end_popup()
+    return stopped
 
 
 def export_form(export: Export, viewport: tuple[int, int]) -> Export:

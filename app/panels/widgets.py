@@ -180,3 +180,19 @@ def identity(name: str | int) -> Iterator[None]:
         yield
     finally:
         imgui.pop_id()
+
+
+def begin_modal(title: str, width: float = 26.0, height: float = 0.0) -> bool:
+    """Begin a modal in the middle of the window and tell whether it is open.
+
+    Parameters
+    ----------
+    width, height : float
+        Its first size in font sizes; 0 for what its content needs.
+    """
+    em = imgui.get_font_size()
+    centre = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(centre, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
+    imgui.set_next_window_size(ImVec2(width * em, height * em), imgui.Cond_.appearing)
+    opened, _ = imgui.begin_popup_modal(title, None, imgui.WindowFlags_.no_saved_settings)
+    return bool(opened)

@@ -17,11 +17,15 @@ GUI = {"imgui_bundle", "glfw", "implot", "imguizmo"}
 PURE = {
     "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.errors", "app.files",
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
+    "app.messages", "app.shortcuts", "app.beginning", "app.documents",
 }  # fmt: skip
 WINDOW = {
-    "app.window", "app.viewport", "app.overlays", "app.placement", "app.dialogs", "app.messages",
-    "app.theme",
+    "app.window", "app.layout", "app.menus", "app.keyboard", "app.panel_windows",
+    "app.viewport_window", "app.viewport", "app.overlays", "app.placement", "app.dialogs",
+    "app.message_list", "app.exports", "app.reports", "app.theme",
 }  # fmt: skip
+TOP = {"app.window", "app.cli", "app.__main__"}
+"""What nothing below may import: each starts the program."""
 
 
 def modules() -> dict[str, Path]:
@@ -82,7 +86,17 @@ def forbidden(name: str) -> set[str]:
         return {"app.render", "app.context", "glfw"} | WINDOW | GL
     if name == "app.context":
         return {"app.render", "app.panels", "app.editor"} | WINDOW | GUI
+    if name in WINDOW:
+        return TOP
     return set()
+
+
+def test_every_module_has_its_layer() -> None:
+    packages = ("ltc", "app.render", "app.panels", "app.cli")
+    known = PURE | WINDOW | TOP | {"app", "app.context"}
+    homeless = {name for name in MODULES if name not in known and not name.startswith(packages)}
+    assert not homeless
+    assert known <= set(MODULES)
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))

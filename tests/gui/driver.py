@@ -67,7 +67,7 @@ SCENE = Scene(
 def start(app: Application) -> None:
     """Bring the application back to the first scene, its light selected."""
     app.window.show(SCENE, None)
-    app.window.settings = replace(app.window.settings, samples=SAMPLES)
+    app.window.viewport.settings = replace(app.window.viewport.settings, samples=SAMPLES)
     app.window.viewport.tool = "move"
     app.window.editor.selection = Selection.light(0)
     app.act(lambda ctx: ctx.mouse_move_to_pos(imgui.ImVec2(5.0, 695.0)))
@@ -349,7 +349,7 @@ def save_reload_compare(app: Application, out: Path) -> None:
     path = out / "saved.json"
     app.drag("vertex 0.2", 30.0, -20.0)
     app.enter("##radiance", 2.5)
-    app.window.save_as(path)
+    app.window.documents.save_as(path)
     assert not app.window.editor.is_modified
     app.frame()
     assert app.window.title.startswith("saved.json —")
@@ -360,7 +360,7 @@ def save_reload_compare(app: Application, out: Path) -> None:
     app.key(CTRL | imgui.Key.z)
     app.key(CTRL | imgui.Key.s)
     app.window.show(SCENE, None)
-    app.window.open(path)
+    app.window.documents.load(path)
     assert app.scene == saved
     assert app.window.editor.path == path
     assert np.array_equal(app.picture(), picture)
@@ -380,7 +380,7 @@ def save_and_open_by_the_dialog(app: Application, out: Path) -> None:
     assert not app.window.editor.is_modified
     app.window.show(SCENE, folder / "other.json")
     app.key(CTRL | imgui.Key.o)
-    files = app.window._dialogs._inside._files
+    files = app.window.dialogs._inside._files
     assert [file.name for file in files] == ["mine.json"]
     app.click("mine.json")
     app.click("###accept file")
@@ -388,7 +388,7 @@ def save_and_open_by_the_dialog(app: Application, out: Path) -> None:
     assert app.scene == edited
     app.key(CTRL | imgui.Key.o)
     app.key(imgui.Key.escape)
-    assert not app.window._dialogs.is_open
+    assert not app.window.dialogs.is_open
     assert app.scene == edited
 
 
@@ -417,42 +417,42 @@ def idle_when_nothing_changes(app: Application, out: Path) -> None:
 
 def export_pictures(app: Application, out: Path) -> None:
     for kind in ("png", "exr"):
-        app.window.export(out / f"picture.{kind}", Export(kind, 160, 90, 2))
-        app.until(lambda: not app.window.is_exporting)
+        app.window.exports.start(out / f"picture.{kind}", Export(kind, 160, 90, 2))
+        app.until(lambda: not app.window.exports.is_busy)
         assert (out / f"picture.{kind}").is_file()
     shot = replace(
         app.window.viewport.shot,
         scene=SCENE,
-        settings=replace(app.window.settings, samples=2),
+        settings=replace(app.window.viewport.settings, samples=2),
         width=160,
         height=90,
     )
     (out / "export.pickle").write_bytes(pickle.dumps(shot))
 
     asked = []
-    app.window._dialogs.ask_save = lambda *arguments: asked.append(arguments)
+    app.window.dialogs.ask_save = lambda *arguments: asked.append(arguments)
     app.key(CTRL | imgui.Key.e)
     app.click("###choose file")
-    del app.window._dialogs.ask_save
+    del app.window.dialogs.ask_save
     title, _, proposal, then = asked[0]
     assert title == "Export a picture"
     assert proposal.suffix == ".png"
-    app.window._export = Export("png", 64, 36, 1)
+    app.window.exports.form = Export("png", 64, 36, 1)
     then(out / "dialog.png")
-    app.until(lambda: not app.window.is_exporting)
+    app.until(lambda: not app.window.exports.is_busy)
     assert (out / "dialog.png").is_file()
-    app.window.export(out / "missing" / "picture.png", Export("png", 16, 9, 1))
-    app.until(lambda: not app.window.is_exporting)
+    app.window.exports.start(out / "missing" / "picture.png", Export("png", 16, 9, 1))
+    app.until(lambda: not app.window.exports.is_busy)
     assert any("does not exist" in message.text for message in app.window.messages.shown)
 
 
 def failures_become_messages(app: Application, out: Path) -> None:
     path = out / "broken.json"
     path.write_text('{"format": "ltc-scene/1", "ligths": []}')
-    app.window.open(path)
+    app.window.documents.load(path)
     assert any("ligths" in message.text for message in app.window.messages.shown)
     assert app.scene == SCENE
-    app.window._dropped.append(str(out / "notes.txt"))
+    app.window.dropped.append(str(out / "notes.txt"))
     app.frame()
     assert any("notes.txt" in message.text for message in app.window.messages.shown)
     missing = edits.add_object(SCENE, str(out / "missing.glb"), "missing")[0]
@@ -467,7 +467,7 @@ def failures_become_messages(app: Application, out: Path) -> None:
 def meshes_can_be_dropped(app: Application, out: Path) -> None:
     path = out / "triangle.obj"
     path.write_text("v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n")
-    app.window._dropped.append(str(path))
+    app.window.dropped.append(str(path))
     app.frame()
     assert app.scene.objects[-1].name == "triangle"
     assert np.isclose(app.scene.objects[-1].transform.scale[0], 0.01)
