@@ -258,7 +258,8 @@ def test_random_configurations(probe, nodes):
                 rng, lamp, position, mirror=aim if aimed else None, isotropic=isotropic
             )
             error = errors(probe(lamps, points, nodes))
-            assert error.max() <= SPECULAR
+            # The few above 1e-4 have an alpha of .001 at a cosine below .01.
+            assert error.max() <= 2.0 * SPECULAR
             assert np.quantile(error, 0.99) <= 3e-5
 
 
@@ -364,8 +365,8 @@ def test_close_to_an_edge(probe, distance):
     position = near + distance * unit(rng.normal(size=near.shape))
     error = errors(probe(lamps, random_points(rng, lamp, position, alpha=(0.05, 1.0))))
     # The outline is known to 1e-7 m of rounding: 1e-7 / distance rad, magnified by 1 / alpha.
-    assert np.quantile(error, 0.99) <= 2e-4 * max(1.0, 1e-3 / distance)
-    assert error.max() <= 2e-3 * max(1.0, 1e-3 / distance)
+    assert np.quantile(error, 0.99) <= 2e-6 * (1e-3 / distance)
+    assert error.max() <= 2e-5 * (1e-3 / distance)
 
 
 def test_in_the_plane_of_the_light(probe):
@@ -390,7 +391,9 @@ def test_size_against_distance(probe, ratio):
     position = origin + unit(rng.normal(size=origin.shape))
     points = random_points(rng, lamp, position, mirror=origin)
     got, want, diffuse, want_diffuse = probe(lamps, points)
-    assert errors((got, want, diffuse, want_diffuse)).max() <= SPECULAR
+    error = errors((got, want, diffuse, want_diffuse))
+    assert np.quantile(error, 0.99) <= 2e-5
+    assert error.max() <= 2.0 * SPECULAR
     if ratio <= 1e-3:
         facing = np.abs(
             np.sum(
