@@ -270,6 +270,11 @@ class Scene:
                     f"materials ({', '.join(sorted(known)) or 'none'})"
                 )
 
+    def object_materials(self) -> tuple[Material, ...]:
+        """Return each object's material, in the order of the objects."""
+        by_name = {material.name: material for material in self.materials}
+        return tuple(by_name[item.material] for item in self.objects)
+
     def material_of(self, item: SceneObject) -> Material:
         return next(m for m in self.materials if m.name == item.material)
 
@@ -278,10 +283,12 @@ class Scene:
 class RenderSettings:
     """How to compute the picture: technique by name, and samples per pixel.
 
+    Technique ``auto`` is whichever suits the scene (`app.render.techniques`).
+
     One sample is exactly the pixel centre.
     """
 
-    technique: str = "ltc"
+    technique: str = "auto"
     samples: int = 1
 
     def __post_init__(self) -> None:

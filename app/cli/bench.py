@@ -27,7 +27,7 @@ from app.cli.common import (
     whole_number,
 )
 from app.files import check_output, replace_file
-from app.render.techniques import find_technique
+from app.render.techniques import AUTOMATIC, suited_technique, technique_of
 from app.scene import RenderSettings, Scene, Shot
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def bench(
         list[str],
         typer.Argument(metavar="SCENE...", help="Scene files, or names of demo scenes."),
     ],
-    techniques: TechniquesOption = ["ltc"],  # noqa: B006 (typer copies it)
+    techniques: TechniquesOption = [AUTOMATIC],  # noqa: B006 (typer copies it)
     size: SizeOption = "1920x1080",
     repeats: Annotated[
         int,
@@ -108,7 +108,7 @@ def bench(
     """
     width, height = image_size(size)
     for technique in techniques:
-        find_technique(technique)
+        suited_technique(technique, anisotropic=False)
     if json_file is not None:
         check_output(json_file, "a table of figures", (".json",))
     loaded = [(name, named_scene(name)) for name in scenes]
@@ -157,7 +157,8 @@ def _shots(
         first = RenderSettings(technique=techniques[0])
         yield name, BASELINE, Shot(replace(scene, materials=black), first, width, height)
         for technique in techniques:
-            yield name, technique, Shot(scene, RenderSettings(technique=technique), width, height)
+            own = technique_of(scene, technique)
+            yield name, own, Shot(scene, RenderSettings(technique=own), width, height)
 
 
 def _measure(

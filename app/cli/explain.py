@@ -20,7 +20,7 @@ from app.cli.common import (
     messages,
     named_scene,
 )
-from app.render.techniques import find_technique
+from app.render.techniques import AUTOMATIC, suited_technique
 from app.scene import RenderSettings, Shot
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def explain(
     scene: SceneArgument,
     size: SizeOption = DEFAULT_SIZE,
     samples: SamplesOption = 16,
-    technique: TechniqueOption = "ltc",
+    technique: TechniqueOption = AUTOMATIC,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
     """Say what is compiled, allocated, loaded and run for a scene, and what is left out and why.
@@ -41,7 +41,7 @@ def explain(
       ltc-viewer explain scene.json --size 1920x1080
     """
     width, height = image_size(size)
-    find_technique(technique)
+    suited_technique(technique, anisotropic=False)
     settings = RenderSettings(technique=technique, samples=samples)
     plan = _plan(Shot(named_scene(scene), settings, width, height))
     if as_json:

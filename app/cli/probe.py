@@ -21,7 +21,7 @@ from app.cli.common import (
 )
 from app.errors import InputError, nearest, os_reason, require_file
 from app.files import check_output, replace_file
-from app.render.techniques import find_technique
+from app.render.techniques import AUTOMATIC, find_technique, suited_technique
 from app.scene import ALPHA_MIN, RenderSettings
 from app.scene_io import LARGEST_NUMBER
 
@@ -45,7 +45,7 @@ def probe(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="OUT.npz", help="File of results to write.")
     ],
-    technique: TechniqueOption = "ltc",
+    technique: TechniqueOption = AUTOMATIC,
 ) -> None:
     """Shade given points on the GPU with the functions of the lighting pass.
 
@@ -61,13 +61,14 @@ def probe(
     Example:
       ltc-viewer probe scene.json points.npz -o radiance.npz
     """
-    find_technique(technique)
+    suited_technique(technique, anisotropic=False)
     check_output(output, "an array file", (".npz",))
     arrays = read_points(Path(points))
     wanted = named_scene(scene)
-    settings = RenderSettings(technique=technique)
     count = len(arrays["position"])
     anisotropic = int(np.count_nonzero(arrays["alpha"][:, 0] != arrays["alpha"][:, 1]))
+    technique = suited_technique(technique, anisotropic > 0)
+    settings = RenderSettings(technique=technique)
     if anisotropic and not find_technique(technique).anisotropic:
         messages().print(
             f"{anisotropic} of {count} points are anisotropic: technique {technique} shades them "

@@ -19,7 +19,7 @@ from app.cli.common import (
     named_scene,
 )
 from app.images import check_image_path, save_image
-from app.render.techniques import find_technique
+from app.render.techniques import AUTOMATIC, suited_technique
 from app.scene import RenderSettings, Shot
 
 
@@ -31,7 +31,7 @@ def shot(
     ],
     size: SizeOption = DEFAULT_SIZE,
     samples: SamplesOption = 16,
-    technique: TechniqueOption = "ltc",
+    technique: TechniqueOption = AUTOMATIC,
 ) -> None:
     """Render a scene to a picture, without a window.
 
@@ -43,7 +43,7 @@ def shot(
       ltc-viewer shot scene.json -o picture.png --size 1920x1080 --samples 64
     """
     width, height = image_size(size)
-    find_technique(technique)
+    suited_technique(technique, anisotropic=False)
     check_image_path(output)
     settings = RenderSettings(technique=technique, samples=samples)
     wanted = Shot(named_scene(scene), settings, width, height)

@@ -24,7 +24,7 @@ from app.render.pack import (
     light_geometry,
 )
 from app.render.techniques import DEFAULT_TECHNIQUE, find_technique
-from app.scene import AreaLight, Material, Scene
+from app.scene import AreaLight, Scene
 
 STORAGE_TEXTURE_WIDTH = 1024
 """Texels in a row of the textures that hold lights or materials too many for a block."""
@@ -154,7 +154,7 @@ class LightingFeatures:
         """Raise `InputError` if lights or objects are more than the machine can hold."""
         lights = LightNeeds.of(scene.lights, limits)
         shines = lights.one_sided or lights.two_sided
-        used = used_materials(scene)
+        used = scene.object_materials()
         if TEXELS_PER_MATERIAL * len(used) > limits.storage_texels:
             raise InputError(
                 f"objects: there are {len(used)}, "
@@ -227,9 +227,3 @@ def probe_defines(lights: LightNeeds, technique: str) -> dict[str, int]:
         **technique_defines(technique),
         **lights.defines(),
     }
-
-
-def used_materials(scene: Scene) -> tuple[Material, ...]:
-    """Return each object's material, in the order of the objects."""
-    by_name = {material.name: material for material in scene.materials}
-    return tuple(by_name[item.material] for item in scene.objects)

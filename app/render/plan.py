@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.render import gbuffer
-from app.render.features import LightingFeatures, Limits, used_materials
+from app.render.features import LightingFeatures, Limits
 from app.render.gbuffer import load_meshes, mesh_bytes, objects_spec
 from app.render.lighting import lighting_spec
 from app.render.pack import LIGHT_VERTEX, TEXELS_PER_MATERIAL, pack_light_shapes
@@ -19,7 +19,7 @@ from app.render.post import display_spec
 from app.render.programs import ProgramSpec
 from app.render.storage import storage_bytes
 from app.render.tables import isotropic_textures
-from app.render.techniques import DEFAULT_TECHNIQUE, find_technique
+from app.render.techniques import DEFAULT_TECHNIQUE, find_technique, technique_of
 from app.scene import TONE_MAPS, Scene, Shot
 
 ATTACHMENTS = {
@@ -204,13 +204,13 @@ def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path]) -> Plan:
         If a shader does not assemble.
     """
     scene, settings = shot.scene, shot.settings
-    technique = find_technique(settings.technique)
-    needs = needs_of(scene, settings.samples, limits, settings.technique)
+    technique = technique_of(scene, settings.technique)
+    needs = needs_of(scene, settings.samples, limits, technique)
     pixels = shot.width * shot.height
     samples = "1 sample" if settings.samples == 1 else f"{settings.samples} samples"
     return Plan(
-        f"{shot.width}x{shot.height}, {samples} per pixel, technique {settings.technique} "
-        f"({technique.description})",
+        f"{shot.width}x{shot.height}, {samples} per pixel, technique {technique} "
+        f"({find_technique(technique).description})",
         tuple(
             _planned_program(spec, roots) for spec in (*needs.programs, display_spec(scene.display))
         ),
@@ -313,7 +313,7 @@ def _count(number: int, noun: str) -> str:
 
 
 def _left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
-    scene, used, lights = shot.scene, used_materials(shot.scene), features.lights
+    scene, used, lights = shot.scene, shot.scene.object_materials(), features.lights
     shines = lights.one_sided or lights.two_sided
     out: list[LeftOut] = []
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from app.errors import InputError
 from app.render.camera import CameraFrame
-from app.render.features import LightNeeds, Limits, used_materials
+from app.render.features import LightNeeds, Limits
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
 from app.render.plan import ATTACHMENTS, FORMAT_BYTES, Needs, Plan, make_plan, needs_of
@@ -26,7 +26,7 @@ from app.render.post import DisplayPass
 from app.render.programs import Programs
 from app.render.sampling import pixel_offset
 from app.render.state import begin_pass, release_framebuffer
-from app.render.techniques import find_technique
+from app.render.techniques import find_technique, suited_technique, technique_of
 from app.render.timers import PassTimers
 from app.scene import Display, RenderSettings, Scene, Shot
 
@@ -338,7 +338,6 @@ class Renderer:
         ValueError
             If a shape is wrong.
         """
-        technique = find_technique(settings.technique)
         arrays = {}
         for name, values, width in (
             ("position", position, 3),
@@ -355,14 +354,16 @@ class Renderer:
         for name, array in arrays.items():
             if len(array) != count:
                 raise ValueError(f"{name} has {len(array)} rows, expected {count} as in position")
+        alphas = arrays["alpha"]
+        technique = suited_technique(settings.technique, bool(np.any(alphas[:, 0] != alphas[:, 1])))
         needs = LightNeeds.of(scene.lights, self.limits)
         if not (needs.one_sided or needs.two_sided) or not count:
             zero = np.zeros((count, 3), dtype=np.float32)
             return {"specular": zero, "diffuse": zero.copy()}
         self._hold_lights(scene, needs)
-        if technique.has_tables:
+        if find_technique(technique).has_tables:
             self._lighting.load_tables()
-        specular, diffuse = self._lighting.probe(needs, settings.technique, **arrays)
+        specular, diffuse = self._lighting.probe(needs, technique, **arrays)
         return {"specular": specular, "diffuse": diffuse}
 
     def timings(self, *, wait: bool = True) -> dict[str, float]:
@@ -459,7 +460,6 @@ class Renderer:
         If that fails, the last picture stays, and the next call starts again.
         """
         start = time.perf_counter()
-        find_technique(shot.settings.technique)
         side = max(shot.width, shot.height)
         if side > self.limits.texture_side:
             raise InputError(
@@ -467,7 +467,8 @@ class Renderer:
                 f"expected at most {self.limits.texture_side} pixels a side"
             )
         scene = shot.scene
-        needs = self._needs_of(scene, samples, shot.settings.technique)
+        technique = technique_of(scene, shot.settings.technique)
+        needs = self._needs_of(scene, samples, technique)
         features = needs.lighting
         self._stale = True
         for spec in needs.programs:
@@ -504,8 +505,9 @@ class Renderer:
     def _needs_of(self, scene: Scene, samples: int, technique: str) -> Needs:
         """Return `needs_of`, from the last time if nothing that it depends on is new."""
         if self._needs is not None and self._seen is not None and not self._stale:
-            seen, settings = self._seen.shot.scene, self._seen.shot.settings
-            same = settings.technique == technique and all(
+            seen = self._seen.shot.scene
+            before = technique_of(seen, self._seen.shot.settings.technique)
+            same = before == technique and all(
                 getattr(seen, part) is getattr(scene, part)
                 for part in ("materials", "objects", "lights")
             )
@@ -575,7 +577,7 @@ class Renderer:
             or held[1] is not scene.objects
             or held[2] != uniform_texels
         ):
-            self._lighting.set_materials(used_materials(scene), uniform_texels)
+            self._lighting.set_materials(scene.object_materials(), uniform_texels)
             self._held_materials = (scene.materials, scene.objects, uniform_texels)
 
     def _radiance_texture(self) -> moderngl.Texture:

@@ -558,7 +558,7 @@ def test_techniques_are_listed(command: str, capfd: pytest.CaptureFixture[str]) 
     out, err = capfd.readouterr()
     assert err == ""
     lines = out.splitlines()
-    assert [line.split()[0] for line in lines] == list(TECHNIQUES)
+    assert [line.split()[0] for line in lines] == ["auto", *TECHNIQUES]
 
 
 def test_version(capfd: pytest.CaptureFixture[str]) -> None:

@@ -100,6 +100,10 @@ def test_probe(folder: Path) -> None:
         alpha=np.array([[0.2, 0.2]] * (count - 1) + [[0.2, 0.3]]),
     )
     done = command(folder, "probe", "lit.json", "points.npz", "-o", "out.npz")
+    assert done.stderr == ""
+    with np.load(folder / "out.npz") as found:
+        assert str(found["technique"]) == "ggx"  # for the one anisotropic point
+    done = command(folder, "probe", "lit.json", "points.npz", "-o", "out.npz", "--technique", "ltc")
     assert done.stdout == "out.npz\n"
     assert "1 of 7 points are anisotropic" in done.stderr
     with np.load(folder / "out.npz") as found:
