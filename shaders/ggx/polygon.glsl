@@ -27,16 +27,49 @@ vec3 ggx_weights(vec3 h, GgxView view)
     return vec3(v_h / (h2 * h2), smith, smith * (x2 * x2 * x));
 }
 
+#if GGX_NODES > 1
+// A node of the outline: the unit half vector and its change, times the node's weight.
+struct FanNode {
+    vec3 u;
+    vec3 du;
+};
+
+// Nodes of Gauss and Legendre in psi, i from 0.
+FanNode fan_node(HalfVectorEdge edge, int i)
+{
+#if GGX_NODES == 2
+    float at = i == 0 ? 0.211324865 : 0.788675135;
+    float weight = 0.5;
+#else
+    float at = 0.112701665 + 0.387298335 * float(i);
+    float weight = i == 1 ? 0.444444444 : 0.277777778;
+#endif
+    vec3 b = edge.cone.b;
+    mat3 axes = mat3(edge.cone.w1, edge.cone.w2, edge.cone.w3);
+    vec2 inverse = 1.0 / (b.xy + b.z);
+    vec2 radii = sqrt(b.z * inverse);
+    vec2 heights = b.xy * inverse;
+    float angle = edge.sweep * at;
+    vec2 turn = vec2(cos(angle), sin(angle));
+    vec2 c = vec2(edge.start.x * turn.x - edge.start.y * turn.y,
+                  edge.start.y * turn.x + edge.start.x * turn.y);
+    float height = sqrt(dot(heights, c * c));
+    float slope = (heights.y - heights.x) * c.x * c.y / max(height, 1e-15);
+    return FanNode(axes * vec3(radii * c, height),
+                   (weight * edge.sweep) * (axes * vec3(-radii.x * c.y, radii.y * c.x, slope)));
+}
+
 // Sums over the nodes of a fan from the mean half vector.
 struct FanSum {
     float density;
     vec2 away;      // density times the difference of both weights from the centre's
 };
 
-void add_fan_node(vec3 u, vec3 du, vec3 center, vec3 at_center, GgxView view, inout FanSum sum)
+void add_fan_node(
+    FanNode node, vec3 center, vec3 at_center, GgxView view, inout FanSum sum)
 {
-    vec3 chord = u - center;
-    float k = dot(center, cross(chord, du));
+    vec3 chord = node.u - center;
+    float k = dot(center, cross(chord, node.du));
 #if GGX_NODES == 2
     vec3 at = ggx_weights(center + 0.75 * chord, view);
     float density = 0.888888889 * k * at.x;
@@ -53,43 +86,7 @@ void add_fan_node(vec3 u, vec3 du, vec3 center, vec3 at_center, GgxView view, in
     sum.away += density * (at.yz - at_center.yz);
 #endif
 }
-
-// Nodes at equal weights of Gauss and Legendre in psi.
-void add_fan_edge(
-    HalfVectorEdge edge, vec3 center, vec3 at_center, GgxView view, inout FanSum sum)
-{
-    vec3 b = edge.cone.b;
-    mat3 axes = mat3(edge.cone.w1, edge.cone.w2, edge.cone.w3);
-    vec2 inverse = 1.0 / (b.xy + b.z);
-    vec2 radii = sqrt(b.z * inverse);
-    vec2 heights = b.xy * inverse;
-#if GGX_NODES == 2
-    const int count = 2;
-    const float first = 0.211324865;
-    const float apart = 0.577350269;
-#else
-    const int count = 3;
-    const float first = 0.112701665;
-    const float apart = 0.387298335;
 #endif
-    for (int i = 0; i < count; ++i) {
-        float angle = edge.sweep * (first + float(i) * apart);
-        vec2 turn = vec2(cos(angle), sin(angle));
-        vec2 c = vec2(edge.start.x * turn.x - edge.start.y * turn.y,
-                      edge.start.y * turn.x + edge.start.x * turn.y);
-        float height = sqrt(dot(heights, c * c));
-        float slope = (heights.y - heights.x) * c.x * c.y / max(height, 1e-15);
-#if GGX_NODES == 2
-        float weight = 0.5;
-#else
-        float weight = i == 1 ? 0.444444444 : 0.277777778;
-#endif
-        add_fan_node(axes * vec3(radii * c, height),
-                     (weight * edge.sweep) *
-                         (axes * vec3(-radii.x * c.y, radii.y * c.x, slope)),
-                     center, at_center, view, sum);
-    }
-}
 
 // A light about its centre of perspective, directions as differences from that centre's.
 struct GgxLight {
@@ -210,6 +207,11 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
     return true;
 }
 
+#if GGX_NODES > 1
+// Edges whose nodes wait for the fan's centre; with more, all are computed again.
+const int STORED_EDGES = 12;
+#endif
+
 // Integrals for F = 1 and with the weight (1 - wo.h)^5, light radiance 1.
 vec2 ggx_light_specular(
     PlanarLight light, PlaneView plane, vec3 normal, mat3 tangent_from_world, GgxView view)
@@ -223,14 +225,13 @@ vec2 ggx_light_specular(
     vec3 center = vec3(0.0);
     vec3 at_center = vec3(0.0);
     float share = 0.0;
+#if GGX_NODES > 1
     FanSum fan = FanSum(0.0, vec2(0.0));
-    // First the outline's sum, which holds the fan's centre, then the fan.
-#if GGX_NODES == 1
-    const int rounds = 1;
-#else
-    const int rounds = 2;
+    FanNode nodes[GGX_NODES * STORED_EDGES];
+    int edges = 0;
 #endif
-    for (int round = 0; round < rounds; ++round) {
+    // First the outline's sum, which holds the fan's centre, then the fan.
+    for (int round = 0; round < 2; ++round) {
         Contour contour = contour_start(light, plane, about.placed, normal);
         while (!contour_ends(light, contour)) {
             PlanarEdge planar;
@@ -243,35 +244,48 @@ vec2 ggx_light_specular(
             }
             HalfVectorEdge edge;
             if (light_edge(about, planar, view, edge)) {
-#if GGX_NODES == 1
-                vector += edge.integral;
-#else
-                if (round == 0) {
-                    vector += edge.integral;
-                } else {
-                    add_fan_edge(edge, center, at_center, view, fan);
+#if GGX_NODES > 1
+                bool stored = round == 0 && edges < STORED_EDGES;
+                for (int i = 0; i < GGX_NODES; ++i) {
+                    if (stored) {
+                        nodes[GGX_NODES * edges + i] = fan_node(edge, i);
+                    } else if (round == 1) {
+                        add_fan_node(fan_node(edge, i), center, at_center, view, fan);
+                    }
                 }
+                edges += 1;
 #endif
+                vector += edge.integral;
             }
         }
-        if (round == 0) {
-            vector = pinned ? pinned_vector(about, pinned_sum, view) : vector;
-            vector *= winding;
-            share = min(scale * dot(vector, view.bent), 1.0);
-            float length2 = dot(vector, vector);
-            // Nothing lit, or no more than rounding.
-            if (!(share > 0.0) || length2 < 1e-36) {
-                return vec2(0.0);
-            }
-            center = pinned ? normalize(about.half_vector) : vector * inversesqrt(length2);
-            at_center = ggx_weights(center, view);
-            if (pinned) {
-                return share * at_center.yz;
-            }
+        if (round == 1) {
+            break;
         }
+        vector = pinned ? pinned_vector(about, pinned_sum, view) : vector;
+        vector *= winding;
+        share = min(scale * dot(vector, view.bent), 1.0);
+        float length2 = dot(vector, vector);
+        // Nothing lit, or no more than rounding.
+        if (!(share > 0.0) || length2 < 1e-36) {
+            return vec2(0.0);
+        }
+        center = pinned ? normalize(about.half_vector) : vector * inversesqrt(length2);
+        at_center = ggx_weights(center, view);
+#if GGX_NODES == 1
+        break;
+#else
+        if (pinned || edges <= STORED_EDGES) {
+            break;
+        }
+#endif
     }
     vec2 mean = at_center.yz;
 #if GGX_NODES > 1
+    if (edges <= STORED_EDGES) {
+        for (int i = 0; i < GGX_NODES * edges; ++i) {
+            add_fan_node(nodes[i], center, at_center, view, fan);
+        }
+    }
     float whole = scale * winding;
     mean += fan.away * (whole / max(abs(whole * fan.density), share));
 #endif
