@@ -18,7 +18,7 @@ from app.panels.light import light_panel, rename_field
 from app.panels.material import material_panel, object_panel
 from app.panels.scene_tree import scene_panel
 from app.panels.widgets import button, hint, name_field
-from app.render.techniques import TECHNIQUES, find_technique
+from app.render.techniques import AUTOMATIC, TECHNIQUES, find_technique, suited_technique
 from app.scene import Material, RenderSettings, Scene, SceneObject
 
 
@@ -79,7 +79,8 @@ class PanelWindows:
                 return
             material = scene.materials[0]
             self._material = material.name
-        anisotropic = find_technique(settings.technique).anisotropic
+        technique = suited_technique(settings.technique, anisotropic=True)
+        anisotropic = find_technique(technique).anisotropic
         self._stage(self._material_rows(scene, material, item, anisotropic))
 
     def _material_rows(
@@ -120,7 +121,7 @@ class PanelWindows:
     def display(self, settings: RenderSettings) -> RenderSettings:
         """Draw the panel of exposure, tone map and quality; return the settings as edited."""
         scene = self._editor.scene
-        display, settings = display_panel(scene.display, settings, tuple(TECHNIQUES))
+        display, settings = display_panel(scene.display, settings, (AUTOMATIC, *TECHNIQUES))
         self._stage(replace(scene, display=display))
         return settings
 

@@ -41,6 +41,7 @@ from app.panels.performance import performance_panel
 from app.panels.question import unsaved_question
 from app.panels.status import status_bar
 from app.render.renderer import Renderer
+from app.render.techniques import technique_of
 from app.reports import Reports
 from app.scene import Scene
 from app.shortcuts import Action
@@ -205,7 +206,8 @@ class Window:
         step, shot = self.editor.undo_name, self.viewport.shot
         size = (shot.width, shot.height) if shot is not None else (0, 0)
         text = f"Last edit: {step}" if step else "Drag the picture to look around"
-        status_bar(text, self.viewport.samples, size, self.viewport.settings.technique)
+        technique = technique_of(self.editor.scene, self.viewport.settings.technique)
+        status_bar(text, self.viewport.samples, size, technique)
 
     # --- docked windows -------------------------------------------------------------
 
