@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app import edits
+from app import edits, lights
 from app.camera_control import project
 from app.editor import NOTHING, Selection
 from app.scene import Material, Scene, SceneObject, Transform
@@ -36,9 +36,9 @@ def first_selection(scene: Scene) -> Selection:
     """Return the light with the fewest corners amid the picture: the one to try first."""
     shown = []
     for index, light in enumerate(scene.lights):
-        at = project(scene.camera, edits.centre_of(light), 16.0, 9.0)
+        at = project(scene.camera, lights.centre_of(light), 16.0, 9.0)
         if light.visible and at is not None and 1.0 < at[0] < 15.0 and 1.0 < at[1] < 8.0:
-            shown.append((len(edits.vertices_of(light)), index))
+            shown.append((len(lights.vertices_of(light)), index))
     return Selection.light(min(shown)[1]) if shown else NOTHING
 
 

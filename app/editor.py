@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from app import edits
+from app import edits, lights, step_names
 from app.scene import AreaLight, Camera, Scene, SceneObject
 
 Kind: TypeAlias = Literal["none", "light", "object"]
@@ -97,7 +97,7 @@ def remove_selected(scene: Scene, selection: Selection) -> tuple[Scene, Selectio
         return scene, selection
     if selection.vertex is None:
         return edits.remove_light(scene, selection.index), NOTHING
-    light = edits.remove_vertex(scene.lights[selection.index], selection.vertex)
+    light = lights.remove_vertex(scene.lights[selection.index], selection.vertex)
     return edits.replace_light(scene, selection.index, light), replace(selection, vertex=None)
 
 
@@ -304,7 +304,9 @@ class Editor:
         scene, selection = edit(self._scene, self._selection)
         if scene != self._scene:
             corner = self._selection.vertex is not None
-            self.apply(f"{verb} corner" if corner else edits.describe(self._scene, scene), scene)
+            self.apply(
+                f"{verb} corner" if corner else step_names.describe(self._scene, scene), scene
+            )
             self.selection = selection
 
     def _record(self, name: str) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import camera_control as control
-from app import edits, theme
+from app import lights, planes, theme
 from app.scene import AreaLight, Camera, Vec3
 from app.vectors import add, scale
 
@@ -103,8 +103,8 @@ class Canvas:
 
     def direction(self, light: AreaLight) -> None:
         """Draw a short line from a light's centre to where it shines."""
-        centre, radius = edits.bounds_of(light)
-        tip = add(centre, scale(edits.normal_of(light.plane), 0.6 * radius))
+        centre, radius = lights.bounds_of(light)
+        tip = add(centre, scale(planes.normal_of(light.plane), 0.6 * radius))
         self.segment(centre, tip, theme.u32(theme.ACCENT, 0.5), 1.5)
         at = self.view.project(self.camera, tip)
         if at is not None:
@@ -138,7 +138,7 @@ def middles_of(view: View, camera: Camera, light: AreaLight) -> list[Middle]:
     """Return the middles of a light's edges that are in front of the eye."""
     found = []
     for c, contour in enumerate(light.outline.contours):
-        world = [edits.point_on(light.plane, point) for point in contour.points]
+        world = [planes.point_on(light.plane, point) for point in contour.points]
         for e, (a, b) in enumerate(zip(world, world[1:] + world[:1], strict=True)):
             first, last = view.project(camera, a), view.project(camera, b)
             at = view.project(camera, scale(add(a, b), 0.5))

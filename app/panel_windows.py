@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app import edits
+from app import edits, step_names
 from app.beginning import first_material
 from app.editor import Editor
 from app.panels.camera import camera_panel
@@ -41,7 +41,7 @@ class PanelWindows:
     def _stage(self, scene: Scene) -> None:
         """Make a panel's scene the current one, as part of one step per held control."""
         if scene is not self._editor.scene and scene != self._editor.scene:
-            self._editor.stage(edits.describe(self._editor.scene, scene), scene)
+            self._editor.stage(step_names.describe(self._editor.scene, scene), scene)
 
     def scene(self) -> None:
         """Draw the list of everything."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app import edits
+from app import edits, lights, planes
 from app.editor import Selection
 from app.meshes import load_mesh
 from app.render.camera import world_from_object
@@ -32,11 +32,11 @@ def pose_of(scene: Scene, selection: Selection) -> FloatArray:
         transform = scene.objects[selection.index].transform
         return world_from_object(replace(transform, scale=(1.0, 1.0, 1.0)))
     light = scene.lights[selection.index]
-    normal = np.array(edits.normal_of(light.plane))
+    normal = np.array(planes.normal_of(light.plane))
     u = np.array(light.plane.u) / length(light.plane.u)
     pose = np.eye(4)
     pose[:3, :3] = np.stack([u, np.cross(normal, u), normal], axis=1)
-    pose[:3, 3] = edits.centre_of(light)
+    pose[:3, 3] = lights.centre_of(light)
     return pose
 
 
@@ -50,7 +50,7 @@ def moved_by(scene: Scene, selection: Selection, motion: FloatArray) -> Scene:
     rigid[:3, :3] = left @ right
     if selection.kind == "light":
         light = scene.lights[selection.index]
-        plane = edits.transform_plane(light.plane, rigid)
+        plane = planes.transform_plane(light.plane, rigid)
         return edits.replace_light(scene, selection.index, replace(light, plane=plane))
     item = edits.transform_object(scene.objects[selection.index], rigid)
     return edits.replace_object(scene, selection.index, item)
@@ -68,7 +68,7 @@ def sphere_around(scene: Scene, selection: Selection) -> tuple[Vec3, float] | No
         If a mesh cannot be loaded.
     """
     if selection.kind == "light":
-        return edits.bounds_of(scene.lights[selection.index])
+        return lights.bounds_of(scene.lights[selection.index])
     chosen = range(len(scene.objects)) if selection.kind == "none" else [selection.index]
     points = [
         corner
@@ -78,9 +78,9 @@ def sphere_around(scene: Scene, selection: Selection) -> tuple[Vec3, float] | No
     ]
     if selection.kind == "none":
         points += [
-            edits.point_on(light.plane, point)
+            planes.point_on(light.plane, point)
             for light in scene.lights
-            for _, point in edits.vertices_of(light)
+            for _, point in lights.vertices_of(light)
         ]
     if not points:
         return None

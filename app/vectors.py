@@ -1,4 +1,4 @@
-"""Arithmetic on the scene's tuples: a few vector operations in float64.
+"""Arithmetic on the scene's tuples: a few operations on vectors and quaternions in float64.
 
 Scenes hold tuples, edits touch a handful of them at a time, and a tuple in,
 tuple out function reads better there than arrays and conversions.
@@ -8,7 +8,12 @@ from __future__ import annotations
 
 import math
 
-from app.scene import Vec2, Vec3
+import numpy as np
+from numpy.typing import NDArray
+
+from app.scene import Quaternion, Vec2, Vec3
+
+FloatArray = NDArray[np.float64]
 
 
 def add(a: Vec3, b: Vec3) -> Vec3:
@@ -81,3 +86,38 @@ def perpendicular(a: Vec3) -> Vec3:
 def mix(a: Vec2, b: Vec2, weight: float) -> Vec2:
     """Return the point a + weight (b - a) of the plane."""
     return (a[0] + weight * (b[0] - a[0]), a[1] + weight * (b[1] - a[1]))
+
+
+def quaternion_of(rotation: FloatArray) -> Quaternion:
+    """Return the unit quaternion (w, x, y, z) of a (3, 3) rotation matrix (Shepperd 1978)."""
+    m = rotation
+    squares = np.array(
+        [
+            1.0 + m[0, 0] + m[1, 1] + m[2, 2],
+            1.0 + m[0, 0] - m[1, 1] - m[2, 2],
+            1.0 - m[0, 0] + m[1, 1] - m[2, 2],
+            1.0 - m[0, 0] - m[1, 1] + m[2, 2],
+        ]
+    )
+    products = np.array(
+        [
+            [0.0, m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+            [0.0, 0.0, m[1, 0] + m[0, 1], m[0, 2] + m[2, 0]],
+            [0.0, 0.0, 0.0, m[2, 1] + m[1, 2]],
+            [0.0, 0.0, 0.0, 0.0],
+        ]
+    )
+    products += products.T + np.diag(squares)
+    row = products[int(squares.argmax())]
+    w, x, y, z = (row / np.linalg.norm(row)).tolist()
+    return (w, x, y, z)
+
+
+def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Return the Hamilton product a b: the turn b, then a."""
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )

@@ -25,7 +25,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle.imguizmo import im_guizmo as gizmo
 
 from app import camera_control as control
-from app import edits, theme
+from app import edits, lights, planes, theme
 from app.editor import NOTHING, Editor, Selection
 from app.errors import InputError
 from app.overlays import HANDLE, Canvas, View, help_line, is_near, middles_of
@@ -279,7 +279,7 @@ class Viewport:
             return
         if light is not None and imgui.menu_item_simple(f"Aim '{light.name}' here###aim here"):
             try:
-                aimed = edits.aim(light, hit.position_ws)
+                aimed = lights.aim(light, hit.position_ws)
                 scene = edits.replace_light(editor.scene, editor.selection.index, aimed)
                 editor.apply(f"Aim '{light.name}'", scene)
             except SceneError as failure:
@@ -307,11 +307,11 @@ class Viewport:
             self._corner = None
             return
         index, camera = editor.selection.index, self.camera_of(editor.scene)
-        vertices = edits.vertices_of(light)
+        vertices = lights.vertices_of(light)
         if len(vertices) > MOST_HANDLES:
             return
         for vertex, point in vertices:
-            at = self.view.project(camera, edits.point_on(light.plane, point))
+            at = self.view.project(camera, planes.point_on(light.plane, point))
             name = f"vertex {vertex[0]}.{vertex[1]}"
             if at is not None and self._handle(name, at):
                 editor.selection = Selection.light(index, vertex)
@@ -323,7 +323,7 @@ class Viewport:
             grabbed = self._corner is not None and self._corner.vertex == vertex
             name = f"edge {middle.contour}.{middle.edge}"
             if (middle.has_room or grabbed) and self._handle(name, middle.at):
-                wider = edits.add_vertex(light, middle.contour, middle.edge)
+                wider = lights.add_vertex(light, middle.contour, middle.edge)
                 self._begin_corner(editor, f"Add corner to '{light.name}'", vertex, middle.at)
                 editor.update(edits.replace_light(editor.scene, index, wider))
                 editor.selection = Selection.light(index, vertex)
@@ -366,9 +366,9 @@ class Viewport:
         direction = self.view.ray(
             camera, io.mouse_pos.x + drag.grip[0], io.mouse_pos.y + drag.grip[1]
         )
-        hit = control.intersect_plane(camera.eye, direction, plane.origin, edits.normal_of(plane))
+        hit = control.intersect_plane(camera.eye, direction, plane.origin, planes.normal_of(plane))
         if hit is not None:
-            moved = edits.move_vertex(light, drag.vertex, edits.coordinates_on(plane, hit))
+            moved = lights.move_vertex(light, drag.vertex, planes.coordinates_on(plane, hit))
             editor.update(edits.replace_light(editor.scene, drag.light, moved))
 
     def _edge_at(self, editor: Editor, x: float, y: float) -> tuple[int, int, float] | None:
@@ -378,13 +378,13 @@ class Viewport:
             return None
         camera, plane = self.camera_of(editor.scene), light.plane
         direction = self.view.ray(camera, x, y)
-        hit = control.intersect_plane(camera.eye, direction, plane.origin, edits.normal_of(plane))
+        hit = control.intersect_plane(camera.eye, direction, plane.origin, planes.normal_of(plane))
         if hit is None:
             return None
-        contour, edge, along = edits.nearest_edge(light, edits.coordinates_on(plane, hit))
+        contour, edge, along = lights.nearest_edge(light, planes.coordinates_on(plane, hit))
         points = light.outline.contours[contour].points
         point = mix(points[edge], points[(edge + 1) % len(points)], along)
-        at = self.view.project(camera, edits.point_on(plane, point))
+        at = self.view.project(camera, planes.point_on(plane, point))
         if at is None or math.dist(at, (x, y)) > self._unit * HANDLE:
             return None
         return contour, edge, along
@@ -396,7 +396,7 @@ class Viewport:
             return
         contour, edge, along = found
         index = editor.selection.index
-        wider = edits.add_vertex(light, contour, edge, along)
+        wider = lights.add_vertex(light, contour, edge, along)
         editor.apply(
             f"Add corner to '{light.name}'", edits.replace_light(editor.scene, index, wider)
         )
@@ -407,7 +407,7 @@ class Viewport:
             light = editor.scene.lights[index]
             chosen = None
             if imgui.menu_item_simple("Remove corner", "Del"):
-                chosen = edits.remove_vertex
+                chosen = lights.remove_vertex
             if len(light.outline.contours) > 1 and imgui.menu_item_simple("Remove outline"):
                 chosen = _remove_outline
             if chosen is not None:
@@ -536,7 +536,7 @@ class Viewport:
 
     def _corners(self, editor: Editor, light: AreaLight, camera: Camera) -> None:
         """Draw the handles of the selected light."""
-        vertices = edits.vertices_of(light)
+        vertices = lights.vertices_of(light)
         draw, crowded = imgui.get_window_draw_list(), len(vertices) > CROWD
         canvas = Canvas(draw, self.view, camera, self._unit, crowded)
         if len(vertices) > MOST_HANDLES:
@@ -548,7 +548,7 @@ class Viewport:
             if middle.has_room:
                 canvas.middle(middle.at, near=is_near(middle.at, mouse, self._unit))
         for vertex, point in vertices:
-            at = self.view.project(camera, edits.point_on(light.plane, point))
+            at = self.view.project(camera, planes.point_on(light.plane, point))
             if at is not None:
                 canvas.corner(
                     at,
@@ -562,11 +562,11 @@ class Viewport:
         light, camera = scene.lights[index], self.camera_of(scene)
         if self._occlusion_of != (self._shot, index):
             self._occlusion_of = (self._shot, index)
-            self._unasked = edits.vertices_of(light)[:MOST_ASKED]
+            self._unasked = lights.vertices_of(light)[:MOST_ASKED]
         end = time.perf_counter() + ASKING
         while self._unasked and time.perf_counter() < end:
             vertex, point = self._unasked.pop()
-            corner = edits.point_on(light.plane, point)
+            corner = planes.point_on(light.plane, point)
             at = self.view.project(camera, corner)
             hit = self._hit(*at) if at is not None else None
             away = length(subtract(corner, camera.eye))
@@ -590,7 +590,7 @@ def _other_radiance(a: Scene, b: Scene) -> bool:
 
 
 def _remove_outline(light: AreaLight, vertex: tuple[int, int]) -> AreaLight:
-    return edits.remove_contour(light, vertex[0])
+    return lights.remove_contour(light, vertex[0])
 
 
 def _columns(matrix: np.ndarray) -> list[float]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from app import edits
+from app import lights, planes
 from app.panels.widgets import (
     button,
     checkbox,
@@ -87,13 +87,13 @@ def _shape(light: AreaLight, vertex: tuple[int, int] | None) -> tuple[AreaLight,
     width = half_width()
     if button("Add hole", "Cut a square hole into the widest part", width=width):
         try:
-            light = edits.add_hole(light)
+            light = lights.add_hole(light)
         except SceneError as error:
             failure = error
     imgui.same_line()
     last = len(contours) - 1
     if button("Remove hole", "Remove the outline added last", enabled=last > 0, width=width):
-        light = edits.remove_contour(light, last)
+        light = lights.remove_contour(light, last)
     if len(contours) > 1:
         rule = choice(
             "Fill rule", light.outline.fill_rule, FILL_RULES,
@@ -109,17 +109,17 @@ def _shape(light: AreaLight, vertex: tuple[int, int] | None) -> tuple[AreaLight,
             "Corner", at, 0.01, "%.3f", f"Corner {contour}.{point} in the light's own coordinates"
         )
         if (s, t) != at:
-            light = edits.move_vertex(light, vertex, (s, t))
+            light = lights.move_vertex(light, vertex, (s, t))
     return light, failure
 
 
 def _placement(light: AreaLight, target: Vec3) -> tuple[AreaLight, SceneError | None]:
     heading("Placement")
-    centre = edits.centre_of(light)
+    centre = lights.centre_of(light)
     moved = position("Centre", centre, "Centre of the light in the world [m]")
-    light = edits.move_light(light, subtract(moved, centre)) if moved != centre else light
+    light = lights.move_light(light, subtract(moved, centre)) if moved != centre else light
 
-    normal = edits.normal_of(light.plane)
+    normal = planes.normal_of(light.plane)
     azimuth = math.degrees(math.atan2(normal[0], normal[2]))
     elevation = math.degrees(math.asin(max(-1.0, min(1.0, normal[1]))))
     azimuth, elevation = (round(angle, 9) + 0.0 for angle in (azimuth, elevation))
@@ -128,11 +128,11 @@ def _placement(light: AreaLight, target: Vec3) -> tuple[AreaLight, SceneError | 
     )
     raised = slider("Elevation", elevation, -90.0, 90.0, "%.1f°", "Direction it faces, upwards")
     if turned != azimuth:
-        light = edits.rotate_light(light, (0.0, 1.0, 0.0), math.radians(turned - azimuth))
+        light = lights.rotate_light(light, (0.0, 1.0, 0.0), math.radians(turned - azimuth))
     if raised != elevation:
         flat = cross((0.0, 1.0, 0.0), normal)
         axis = normalize(flat) if length(flat) > 1e-6 else normalize(light.plane.u)
-        light = edits.rotate_light(light, axis, -math.radians(raised - elevation))
+        light = lights.rotate_light(light, axis, -math.radians(raised - elevation))
 
     size = _size(light)
     w, h = numbers("Size", size, 0.01, "%.3f", "Width and height of the outline [m]")
@@ -143,24 +143,24 @@ def _placement(light: AreaLight, target: Vec3) -> tuple[AreaLight, SceneError | 
     width = half_width()
     if button("Aim at centre", "Face the point that the camera looks at", width=width):
         try:
-            light = edits.aim(light, target)
+            light = lights.aim(light, target)
         except SceneError as error:
             failure = error
     imgui.same_line()
     if button("Flip side", "Emit to the other side", width=width):
-        light = edits.flip_light(light)
+        light = lights.flip_light(light)
     return light, failure
 
 
 def _size(light: AreaLight) -> tuple[float, float]:
-    (s0, t0), (s1, t1) = edits.extent_of(light)
+    (s0, t0), (s1, t1) = lights.extent_of(light)
     return (s1 - s0) * length(light.plane.u), (t1 - t0) * length(light.plane.v)
 
 
 def _resized(light: AreaLight, across: float, along: float) -> AreaLight:
     """Return the light with plane axes scaled, its centre in place."""
-    before = edits.centre_of(light)
+    before = lights.centre_of(light)
     plane = replace(light.plane, u=scale(light.plane.u, across), v=scale(light.plane.v, along))
     light = replace(light, plane=plane)
-    shift = subtract(before, edits.centre_of(light))
+    shift = subtract(before, lights.centre_of(light))
     return replace(light, plane=replace(plane, origin=add(plane.origin, shift)))

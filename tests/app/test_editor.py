@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app import edits, sliders
+from app import edits, lights, planes, sliders, step_names
 from app.editor import NOTHING, Editor, Selection, duplicate_selected, remove_selected
 from app.scene import (
     ALPHA_MIN,
@@ -41,7 +41,7 @@ def editor() -> Editor:
 
 
 def moved(scene: Scene, s: float) -> Scene:
-    return edits.replace_light(scene, 0, edits.move_vertex(scene.lights[0], (0, 0), (s, -1.0)))
+    return edits.replace_light(scene, 0, lights.move_vertex(scene.lights[0], (0, 0), (s, -1.0)))
 
 
 # --- history ----------------------------------------------------------------
@@ -142,7 +142,7 @@ def test_selection_never_outlives_its_object(editor: Editor) -> None:
     editor.selection = Selection.light(1, (0, 3))
     editor.apply(
         "remove corner",
-        edits.replace_light(editor.scene, 1, edits.remove_vertex(editor.scene.lights[1], (0, 3))),
+        edits.replace_light(editor.scene, 1, lights.remove_vertex(editor.scene.lights[1], (0, 3))),
     )
     assert editor.selection == Selection.light(1)
     editor.apply("remove", edits.remove_light(editor.scene, 1))
@@ -165,14 +165,14 @@ SKEW = replace(LIGHT, plane=Plane((1.0, 2.0, 3.0), (2.0, 0.5, 0.0), (0.3, 1.0, -
 
 @given(st.floats(-5, 5), st.floats(-5, 5))
 def test_plane_coordinates_round_trip(s: float, t: float) -> None:
-    point = edits.point_on(SKEW.plane, (s, t))
-    assert edits.coordinates_on(SKEW.plane, point) == pytest.approx((s, t), abs=1e-12)
+    point = planes.point_on(SKEW.plane, (s, t))
+    assert planes.coordinates_on(SKEW.plane, point) == pytest.approx((s, t), abs=1e-12)
 
 
 def test_metric_of_a_skew_plane_measures_world_lengths() -> None:
-    metric = edits.metric_from_plane(SKEW.plane)
+    metric = planes.metric_from_plane(SKEW.plane)
     for a, b in (((0.0, 0.0), (1.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((1.0, -2.0), (0.5, 3.0))):
-        world = length(subtract(edits.point_on(SKEW.plane, a), edits.point_on(SKEW.plane, b)))
+        world = length(subtract(planes.point_on(SKEW.plane, a), planes.point_on(SKEW.plane, b)))
         flat = np.linalg.norm(metric @ (np.array(a) - np.array(b)))
         assert flat == pytest.approx(world)
 
@@ -180,33 +180,33 @@ def test_metric_of_a_skew_plane_measures_world_lengths() -> None:
 def test_nearest_edge_against_brute_force_in_the_world() -> None:
     rng = np.random.default_rng(3)
     for at in rng.uniform(-2, 2, (50, 2)):
-        contour, edge, along = edits.nearest_edge(SKEW, (at[0], at[1]))
-        found = edits.add_vertex(SKEW, contour, edge, along).outline.contours[0].points[edge + 1]
-        target = np.array(edits.point_on(SKEW.plane, (at[0], at[1])))
-        corners = np.array([edits.point_on(SKEW.plane, p) for p in SQUARE.points])
+        contour, edge, along = lights.nearest_edge(SKEW, (at[0], at[1]))
+        found = lights.add_vertex(SKEW, contour, edge, along).outline.contours[0].points[edge + 1]
+        target = np.array(planes.point_on(SKEW.plane, (at[0], at[1])))
+        corners = np.array([planes.point_on(SKEW.plane, p) for p in SQUARE.points])
         weights = np.linspace(0, 1, 2001)[:, None]
         samples = np.concatenate(
             [a + weights * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)]
         )
         brute = np.linalg.norm(samples - target, axis=-1).min()
-        got = np.linalg.norm(np.array(edits.point_on(SKEW.plane, found)) - target)
+        got = np.linalg.norm(np.array(planes.point_on(SKEW.plane, found)) - target)
         assert got <= brute + 1e-12
         assert got == pytest.approx(brute, abs=2e-3)
 
 
 def test_a_new_vertex_lies_between_its_neighbours_and_comes_away_again() -> None:
-    wider = edits.add_vertex(LIGHT, 0, 3, 0.25)
+    wider = lights.add_vertex(LIGHT, 0, 3, 0.25)
     assert wider.outline.contours[0].points[4] == pytest.approx((-1.0, 0.5))
-    assert edits.remove_vertex(wider, (0, 4)) == LIGHT
+    assert lights.remove_vertex(wider, (0, 4)) == LIGHT
 
 
 def test_a_light_keeps_three_corners() -> None:
-    triangle = edits.remove_vertex(LIGHT, (0, 0))
+    triangle = lights.remove_vertex(LIGHT, (0, 0))
     assert len(triangle.outline.contours[0].points) == 3
     with pytest.raises(SceneError, match="3 is the fewest"):
-        edits.remove_vertex(triangle, (0, 0))
-    hole = edits.remove_vertex(edits.add_hole(LIGHT), (1, 0))
-    assert edits.remove_vertex(hole, (1, 1)) == LIGHT
+        lights.remove_vertex(triangle, (0, 0))
+    hole = lights.remove_vertex(lights.add_hole(LIGHT), (1, 0))
+    assert lights.remove_vertex(hole, (1, 1)) == LIGHT
 
 
 L_SHAPE = AreaLight(
@@ -224,24 +224,24 @@ def test_a_hole_lies_in_a_filled_place_and_empties_it(light, fill_rule, reverse)
     points = light.outline.contours[0].points
     contour = PolygonContour(points[::-1] if reverse else points)
     light = replace(light, outline=Outline((contour,), fill_rule))
-    place, clearance, winding = edits.widest_place(light)
+    place, clearance, winding = lights.widest_place(light)
     assert abs(winding) == 1
     assert clearance > 0.0
-    holed = edits.add_hole(light)
+    holed = lights.add_hole(light)
     hole = np.array(holed.outline.contours[1].points)
-    metric = edits.metric_from_plane(light.plane)
+    metric = planes.metric_from_plane(light.plane)
     distances = np.linalg.norm(hole @ metric.T - place, axis=-1)
     assert distances == pytest.approx(0.5 * math.sqrt(2.0) * clearance)
-    _, _, inside = edits.widest_place(holed)
+    _, _, inside = lights.widest_place(holed)
     rule = {"evenodd": inside % 2 != 0, "nonzero": inside != 0}[fill_rule]
     assert rule  # what is filled now is elsewhere
     contours = [np.array(c.points) @ metric.T for c in holed.outline.contours]
-    turns, _ = edits._winding_and_clearance(contours, place[None])
+    turns, _ = lights._winding_and_clearance(contours, place[None])
     assert (turns[0] % 2 == 0) if fill_rule == "evenodd" else (turns[0] == 0)
 
 
 def test_the_widest_place_of_a_square_is_its_centre() -> None:
-    place, clearance, _ = edits.widest_place(LIGHT)
+    place, clearance, _ = lights.widest_place(LIGHT)
     assert place == pytest.approx([0.0, 0.0], abs=1e-3)
     assert clearance == pytest.approx(1.0, abs=1e-3)
 
@@ -249,7 +249,7 @@ def test_the_widest_place_of_a_square_is_its_centre() -> None:
 def test_no_hole_where_nothing_is_filled() -> None:
     flat = replace(LIGHT, outline=Outline((PolygonContour(((0.0, 0.0), (1.0, 0.0), (2.0, 0.0))),)))
     with pytest.raises(SceneError, match="no filled part"):
-        edits.add_hole(flat)
+        lights.add_hole(flat)
 
 
 # --- planes -----------------------------------------------------------------
@@ -257,37 +257,40 @@ def test_no_hole_where_nothing_is_filled() -> None:
 
 @pytest.mark.parametrize("at", [(3.0, -2.0, 1.0), (0.0, 1.0, 5.0), (0.0, 1.0, -5.0)])
 def test_an_aimed_light_faces_the_point_and_keeps_its_shape(at) -> None:
-    aimed = edits.aim(LIGHT, at)
-    way = normalize(subtract(at, edits.centre_of(LIGHT)))
-    assert edits.normal_of(aimed.plane) == pytest.approx(way, abs=1e-12)
-    assert edits.centre_of(aimed) == pytest.approx(edits.centre_of(LIGHT), abs=1e-12)
+    aimed = lights.aim(LIGHT, at)
+    way = normalize(subtract(at, lights.centre_of(LIGHT)))
+    assert planes.normal_of(aimed.plane) == pytest.approx(way, abs=1e-12)
+    assert lights.centre_of(aimed) == pytest.approx(lights.centre_of(LIGHT), abs=1e-12)
     assert length(aimed.plane.u) == pytest.approx(length(LIGHT.plane.u))
     assert dot(aimed.plane.u, aimed.plane.v) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_light_cannot_be_aimed_at_itself() -> None:
     with pytest.raises(SceneError, match="its own centre"):
-        edits.aim(LIGHT, edits.centre_of(LIGHT))
+        lights.aim(LIGHT, lights.centre_of(LIGHT))
 
 
 def test_a_flipped_light_is_the_same_set_of_points_facing_away() -> None:
-    flipped = edits.flip_light(SKEW)
-    here = {tuple(np.round(edits.point_on(SKEW.plane, p), 9)) for _, p in edits.vertices_of(SKEW)}
-    there = {
-        tuple(np.round(edits.point_on(flipped.plane, p), 9)) for _, p in edits.vertices_of(flipped)
-    }
-    assert here == there
-    assert dot(edits.normal_of(SKEW.plane), edits.normal_of(flipped.plane)) == pytest.approx(-1.0)
+    flipped = lights.flip_light(SKEW)
+
+    def corners(light):
+        return {
+            tuple(np.round(planes.point_on(light.plane, p), 9))
+            for _, p in lights.vertices_of(light)
+        }
+
+    assert corners(flipped) == corners(SKEW)
+    assert dot(planes.normal_of(SKEW.plane), planes.normal_of(flipped.plane)) == pytest.approx(-1.0)
 
 
 def test_a_rigid_matrix_moves_points_as_it_moves_the_plane() -> None:
     turn = np.eye(4)
     turn[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
     turn[:3, 3] = [1, 2, 3]
-    plane = edits.transform_plane(SKEW.plane, turn)
+    plane = planes.transform_plane(SKEW.plane, turn)
     for st_ in ((0.0, 0.0), (1.0, -2.0)):
-        expected = turn @ np.array([*edits.point_on(SKEW.plane, st_), 1.0])
-        assert edits.point_on(plane, st_) == pytest.approx(tuple(expected[:3]))
+        expected = turn @ np.array([*planes.point_on(SKEW.plane, st_), 1.0])
+        assert planes.point_on(plane, st_) == pytest.approx(tuple(expected[:3]))
 
 
 # --- scenes -----------------------------------------------------------------
@@ -299,7 +302,7 @@ def test_a_new_light_faces_the_target_and_has_a_free_name() -> None:
     assert (index, second) == (2, 3)
     light = scene.lights[index]
     way = normalize(subtract(SCENE.camera.target, light.plane.origin))
-    assert edits.normal_of(light.plane) == pytest.approx(way)
+    assert planes.normal_of(light.plane) == pytest.approx(way)
     assert length(cross(light.plane.u, light.plane.v)) == pytest.approx(1.0)
     assert [light.name for light in scene.lights[2:]] == ["light", "light 2"]
 
@@ -308,7 +311,7 @@ def test_duplicates_are_new_and_elsewhere() -> None:
     scene, index = edits.duplicate_light(SCENE, 0)
     assert scene.lights[index].name == "key 2"
     assert scene.lights[index].outline is LIGHT.outline
-    assert edits.centre_of(scene.lights[index]) != edits.centre_of(LIGHT)
+    assert lights.centre_of(scene.lights[index]) != lights.centre_of(LIGHT)
     scene, index = edits.duplicate_object(scene, 1)
     assert scene.objects[index].name == "ball 2"
     assert edits.remove_object(scene, index).objects == SCENE.objects
@@ -345,7 +348,7 @@ def test_a_mesh_comes_with_a_material_of_its_own_and_stands_on_the_ground() -> N
         (edits.add_light(SCENE)[0], "Add light 'light'"),
         (edits.remove_light(SCENE, 1), "Remove light 'fill'"),
         (edits.add_object(SCENE, "box", "box")[0], "Add object 'box'"),
-        (edits.replace_light(SCENE, 0, edits.add_hole(LIGHT)), "Add outline of 'key'"),
+        (edits.replace_light(SCENE, 0, lights.add_hole(LIGHT)), "Add outline of 'key'"),
         (edits.rename_object(SCENE, 1, "orb"), "Rename object 'ball'"),
         (
             edits.replace_material(SCENE, "metal", replace(SCENE.materials[1], alpha=(0.1, 0.1))),
@@ -357,7 +360,7 @@ def test_a_mesh_comes_with_a_material_of_its_own_and_stands_on_the_ground() -> N
     ],
 )
 def test_steps_name_what_changed(after: Scene, name: str) -> None:
-    assert edits.describe(SCENE, after) == name
+    assert step_names.describe(SCENE, after) == name
 
 
 # --- sliders ----------------------------------------------------------------

@@ -17,7 +17,8 @@ GUI = {"imgui_bundle", "glfw", "implot", "imguizmo"}
 PURE = {
     "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.errors", "app.files",
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
-    "app.messages", "app.shortcuts", "app.beginning", "app.documents",
+    "app.lights", "app.planes", "app.step_names", "app.messages", "app.shortcuts",
+    "app.beginning", "app.documents",
 }  # fmt: skip
 WINDOW = {
     "app.window", "app.layout", "app.menus", "app.keyboard", "app.panel_windows",
@@ -81,7 +82,11 @@ def forbidden(name: str) -> set[str]:
     if name in PURE:
         return {"app.render", "app.context", "app.panels"} | WINDOW | GL | GUI
     if name.startswith("app.render"):
-        return {"app.panels", "app.editor", "app.edits", "moderngl_window"} | WINDOW | GUI
+        return (
+            {"app.panels", "app.editor", "app.edits", "app.documents", "moderngl_window"}
+            | WINDOW
+            | GUI
+        )
     if name.startswith("app.panels"):
         return {"app.render", "app.context", "glfw"} | WINDOW | GL
     if name == "app.context":

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui, immapp
 
-from app import dialogs, edits
+from app import dialogs, planes
 from app.scene import Scene, Vec3
 from app.window import Window
 
@@ -184,4 +184,4 @@ class Application:
         """Return where a light's corner is on the screen."""
         chosen = self.scene.lights[light]
         point = chosen.outline.contours[vertex[0]].points[vertex[1]]
-        return self.on_screen(edits.point_on(chosen.plane, point))
+        return self.on_screen(planes.point_on(chosen.plane, point))

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from imgui_bundle import imgui
 
-from app import edits
+from app import edits, lights, planes
 from app.editor import NOTHING, Selection
 from app.panels.export import Export
 from app.scene import (
@@ -162,7 +162,7 @@ def add_and_remove_a_corner(app: Application, out: Path) -> None:
 
 
 def split_an_edge_by_double_click(app: Application, out: Path) -> None:
-    at = app.on_screen(edits.point_on(SCENE.lights[0].plane, (0.81, 0.3)))
+    at = app.on_screen(planes.point_on(SCENE.lights[0].plane, (0.81, 0.3)))
 
     def action(ctx) -> None:
         ctx.mouse_move_to_pos(imgui.ImVec2(*at))
@@ -179,7 +179,7 @@ def split_an_edge_by_double_click(app: Application, out: Path) -> None:
 
 
 def cut_a_hole(app: Application, out: Path) -> None:
-    x, y = app.on_screen(edits.centre_of(SCENE.lights[0]))
+    x, y = app.on_screen(lights.centre_of(SCENE.lights[0]))
     view = app.window.viewport.view
     at = round(y - view.y), round(x - view.x)
     assert app.picture()[at].min() > 120
@@ -213,7 +213,7 @@ def select_by_clicking(app: Application, out: Path) -> None:
     x, y = app.on_screen((1.3, 0.5, 0.8))
     app.click_at(x, y)
     assert app.window.editor.selection == Selection.object(1)
-    x, y = app.on_screen(edits.point_on(SCENE.lights[0].plane, (-0.5, 0.4)))
+    x, y = app.on_screen(planes.point_on(SCENE.lights[0].plane, (-0.5, 0.4)))
     app.click_at(x, y)
     assert app.window.editor.selection == Selection.light(0)
     view = app.window.viewport.view
@@ -257,7 +257,7 @@ def look_around(app: Application, out: Path) -> None:
 
 
 def move_and_turn_with_the_gizmo(app: Application, out: Path) -> None:
-    centre = edits.centre_of(SCENE.lights[0])
+    centre = lights.centre_of(SCENE.lights[0])
     x, y = app.on_screen(centre)
     app.drag_at(x, y, 70.0, 0.0)
     light = app.scene.lights[0]
@@ -276,7 +276,7 @@ def move_and_turn_with_the_gizmo(app: Application, out: Path) -> None:
         app.window.editor.look(SCENE.camera)
     assert app.window.editor.steps == ("Open", "Rotate 'key'")
     turned = app.scene.lights[0]
-    assert np.allclose(edits.centre_of(turned), centre, atol=1e-5)
+    assert np.allclose(lights.centre_of(turned), centre, atol=1e-5)
     assert np.isclose(np.linalg.norm(turned.plane.u), 1.0)
 
 
@@ -295,8 +295,8 @@ def aim_and_look_by_the_context_menu(app: Application, out: Path) -> None:
 
     menu("###aim here")
     light = app.scene.lights[0]
-    way = np.subtract(place, edits.centre_of(light))
-    facing = edits.normal_of(light.plane)
+    way = np.subtract(place, lights.centre_of(light))
+    facing = planes.normal_of(light.plane)
     assert np.dot(way, facing) / np.linalg.norm(way) > 0.9999
     assert app.window.editor.steps == ("Open", "Aim 'key'")
     app.key(CTRL | imgui.Key.z)
@@ -324,7 +324,7 @@ def every_panel_edits_the_scene(app: Application, out: Path) -> None:
     assert max(app.scene.lights[0].radiance) == 7.0
     change("Light", "##azimuth", 30.0)
     change("Light", "##elevation", -20.0)
-    normal = edits.normal_of(app.scene.lights[0].plane)
+    normal = planes.normal_of(app.scene.lights[0].plane)
     assert np.isclose(np.degrees(np.arcsin(normal[1])), -20.0, atol=1e-3)
     assert np.isclose(np.degrees(np.arctan2(normal[0], normal[2])), 30.0, atol=1e-3)
     press("Light", "##two-sided")
@@ -496,7 +496,7 @@ def names_and_visibility(app: Application, out: Path) -> None:
     assert len(app.window.editor.steps) == 2, "typing a name is one step"
     app.click("###visible")
     assert not app.scene.lights[0].visible
-    x, y = app.on_screen(edits.centre_of(SCENE.lights[0]))
+    x, y = app.on_screen(lights.centre_of(SCENE.lights[0]))
     view = app.window.viewport.view
     assert app.picture()[round(y - view.y), round(x - view.x)].max() < 60
     app.key(CTRL | imgui.Key.z)

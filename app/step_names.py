@@ -1,0 +1,69 @@
+"""Names for the steps of the history: what differs between two scenes, in a few words."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from typing import TypeAlias
+
+from app.scene import AreaLight, Material, Scene, SceneObject
+
+_Items: TypeAlias = tuple[Material | SceneObject | AreaLight, ...]
+
+_FIELD_NAMES = {
+    "alpha": "roughness",
+    "f0": "reflectance",
+    "diffuse": "diffuse colour",
+    "two_sided": "two-sided",
+    "visible": "visibility",
+    "fov_y": "field of view",
+    "tone_map": "tone map",
+    "plane": "position",
+    "rotate": "rotation",
+    "translate": "position",
+    "outline": "shape",
+}
+
+
+def describe(before: Scene, after: Scene) -> str:
+    """Return a short name for the difference of two scenes: "Change roughness of 'floor'".
+
+    Names the first difference only, which is what one panel makes in a frame.
+    """
+    for kind, old, new in _lists_of(before, after):
+        if len(new) > len(old):
+            return f"Add {kind} '{new[-1].name}'"
+        if len(new) < len(old):
+            gone = {item.name for item in old} - {item.name for item in new}
+            return f"Remove {kind} '{min(gone, default='')}'"
+        for a, b in zip(old, new, strict=True):
+            if a == b:
+                continue
+            if a.name != b.name:
+                return f"Rename {kind} '{a.name}'"
+            if isinstance(a, AreaLight) and isinstance(b, AreaLight):
+                more = len(b.outline.contours) - len(a.outline.contours)
+                if more:
+                    return f"{'Add' if more > 0 else 'Remove'} outline of '{a.name}'"
+            return f"Change {_first_difference(a, b)} of '{a.name}'"
+    if before.display != after.display:
+        return f"Change {_first_difference(before.display, after.display)}"
+    return "Move camera"
+
+
+def _lists_of(before: Scene, after: Scene) -> tuple[tuple[str, _Items, _Items], ...]:
+    return (
+        ("light", before.lights, after.lights),
+        ("object", before.objects, after.objects),
+        ("material", before.materials, after.materials),
+    )
+
+
+def _first_difference(a: object, b: object) -> str:
+    if not is_dataclass(a):
+        return ""
+    for field in fields(a):
+        old, new = getattr(a, field.name), getattr(b, field.name)
+        if old != new:
+            inner = _first_difference(old, new) if field.name == "transform" else ""
+            return inner or _FIELD_NAMES.get(field.name, field.name)
+    return "value"
