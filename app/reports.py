@@ -27,9 +27,10 @@ class Reports:
 
     def of(self, shot: Shot, viewport: Viewport, renderer: Renderer) -> Report:
         """Return the report on the picture that shows ``shot``."""
-        if self._planned is None or _other_needs(self._planned, shot):
-            self._planned = shot
-            self._plan = plan_lines(renderer.plan(replace(shot, settings=viewport.settings)))
+        wanted = replace(shot, settings=viewport.settings)
+        if self._planned is None or _other_needs(self._planned, wanted):
+            self._planned = wanted
+            self._plan = plan_lines(renderer.plan(wanted))
         times = renderer.timings(wait=False).items()
         return Report(
             passes=tuple((PASS_NAMES.get(name, name), value) for name, value in times),
@@ -62,7 +63,7 @@ def plan_lines(plan: Plan) -> tuple[PlanLine, ...]:
 def _other_needs(a: Shot, b: Shot) -> bool:
     """Tell whether a plan for ``a`` may not be true for ``b``."""
     return (
-        (a.width, a.height) != (b.width, b.height)
+        (a.width, a.height, a.settings) != (b.width, b.height, b.settings)
         or a.scene.lights is not b.scene.lights
         or a.scene.objects is not b.scene.objects
         or a.scene.materials is not b.scene.materials
