@@ -9,7 +9,6 @@ one step however many scenes it passes through: `begin`, `update` ...,
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -212,18 +211,24 @@ class Editor:
             self._show(replace(scene, camera=self._scene.camera))
 
     def duplicate(self) -> None:
-        """Copy what is selected, as one step."""
-        self._edit_selected("Duplicate", duplicate_selected)
+        """Copy the selected light or object, as one step."""
+        scene, selection = duplicate_selected(self._scene, self._selection)
+        self._apply_to_selected(step_names.describe(self._scene, scene), scene, selection)
 
     def remove(self) -> None:
-        """Remove what is selected, as one step.
+        """Remove the selected corner, light or object, as one step.
 
         Raises
         ------
         SceneError
             If a light would keep fewer than three corners.
         """
-        self._edit_selected("Remove", remove_selected)
+        scene, selection = remove_selected(self._scene, self._selection)
+        name = step_names.describe(self._scene, scene)
+        light = self.selected_light
+        if light is not None and self._selection.vertex is not None:
+            name = f"Remove corner of '{light.name}'"
+        self._apply_to_selected(name, scene, selection)
 
     def escape(self) -> None:
         """Cancel a drag if there is one, else select nothing."""
@@ -298,15 +303,9 @@ class Editor:
         self._scene = scene
         self._selection = self._selection.within(scene)
 
-    def _edit_selected(
-        self, verb: str, edit: Callable[[Scene, Selection], tuple[Scene, Selection]]
-    ) -> None:
-        scene, selection = edit(self._scene, self._selection)
+    def _apply_to_selected(self, name: str, scene: Scene, selection: Selection) -> None:
         if scene != self._scene:
-            corner = self._selection.vertex is not None
-            self.apply(
-                f"{verb} corner" if corner else step_names.describe(self._scene, scene), scene
-            )
+            self.apply(name, scene)
             self.selection = selection
 
     def _record(self, name: str) -> bool:

@@ -151,6 +151,30 @@ def test_selection_never_outlives_its_object(editor: Editor) -> None:
     assert editor.selection == NOTHING
 
 
+def test_copying_and_removing_what_is_selected_are_steps_with_names(editor: Editor) -> None:
+    editor.selection = Selection.light(0, (0, 1))
+    editor.duplicate()
+    assert editor.selection == Selection.light(2)
+    editor.selection = Selection.light(0, (0, 1))
+    editor.remove()
+    assert editor.selection == Selection.light(0)
+    editor.remove()
+    editor.remove()
+    assert editor.steps == (
+        "Open", "Add light 'key 2'", "Remove corner of 'key'", "Remove light 'key'",
+    )  # fmt: skip
+
+
+def test_escape_cancels_a_drag_and_then_selects_nothing(editor: Editor) -> None:
+    editor.selection = Selection.object(0)
+    editor.begin("drag")
+    editor.update(moved(editor.scene, -3.0))
+    editor.escape()
+    assert (editor.scene, editor.selection) == (SCENE, Selection.object(0))
+    editor.escape()
+    assert editor.selection == NOTHING
+
+
 def test_update_without_begin_is_an_error(editor: Editor) -> None:
     with pytest.raises(RuntimeError, match="without begin"):
         editor.update(SCENE)
