@@ -32,6 +32,7 @@ from app.overlays import HANDLE, Canvas, View, help_line, is_near, middles_of
 from app.placement import box_corners, moved_by, name_of, pose_of, sphere_around
 from app.render.renderer import Hit, Renderer
 from app.scene import AreaLight, Camera, RenderSettings, Scene, SceneError, Shot, Vec2
+from app.shortcuts import key_of
 from app.vectors import add, length, mix, subtract
 
 STILL_SAMPLES = 32
@@ -406,7 +407,7 @@ class Viewport:
         if imgui.begin_popup_context_item(f"corner {vertex[0]}.{vertex[1]}"):
             light = editor.scene.lights[index]
             chosen = None
-            if imgui.menu_item_simple("Remove corner", "Del"):
+            if imgui.menu_item_simple("Remove corner", key_of("remove")):
                 chosen = lights.remove_vertex
             if len(light.outline.contours) > 1 and imgui.menu_item_simple("Remove outline"):
                 chosen = _remove_outline

@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from app.editor import Selection
 from app.panels.widgets import MUTED
 from app.scene import Scene
+from app.shortcuts import key_of
 
 
 def help_line(scene: Scene, selection: Selection, tool: str) -> str:
@@ -14,15 +15,16 @@ def help_line(scene: Scene, selection: Selection, tool: str) -> str:
     if not scene.lights:
         return "Add a light with + in the Scene panel"
     if selection.kind == "light" and selection.vertex is not None:
-        return "Drag the corner · Delete removes it · drag a dot between corners to add one"
+        removes = f"{key_of('remove')} removes it"
+        return f"Drag the corner · {removes} · drag a dot between corners to add one"
     if selection.kind == "light":
-        move = (
-            "drag the arrows to move the light" if tool == "move" else "drag the rings to turn it"
-        )
-        other = "E to rotate" if tool == "move" else "W to move"
-        return f"Drag corners to reshape · {move} · {other} · drag elsewhere to look around"
+        if tool == "move":
+            use = f"drag the arrows to move the light · {key_of('rotate')} to rotate"
+        else:
+            use = f"drag the rings to turn it · {key_of('move')} to move"
+        return f"Drag corners to reshape · {use} · drag elsewhere to look around"
     if selection.kind == "object":
-        return "Change its look under Material · drag to look around · F frames it"
+        return f"Change its look under Material · drag to look around · {key_of('frame')} frames it"
     return "Click a light to shape it, an object to change its material · drag to look around"
 
 
