@@ -34,29 +34,43 @@ struct FanNode {
     vec3 du;
 };
 
-// Nodes of Gauss and Legendre in psi, i from 0.
-FanNode fan_node(HalfVectorEdge edge, int i)
+// Gauss and Legendre's nodes and weights on [0, 1], i from 0.
+vec2 along_edge(int i)
 {
 #if GGX_NODES == 2
-    float at = i == 0 ? 0.211324865 : 0.788675135;
-    float weight = 0.5;
+    return vec2(i == 0 ? 0.211324865 : 0.788675135, 0.5);
+#elif GGX_NODES == 3
+    return vec2(0.112701665 + 0.387298335 * float(i), i == 1 ? 0.444444444 : 0.277777778);
 #else
-    float at = 0.112701665 + 0.387298335 * float(i);
-    float weight = i == 1 ? 0.444444444 : 0.277777778;
+    float side = i < 2 ? -1.0 : 1.0;
+    return i == 0 || i == 3 ? vec2(0.5 + side * 0.430568156, 0.173927423)
+                            : vec2(0.5 + side * 0.169990522, 0.326072577);
 #endif
+}
+
+// The widest panel of psi [rad] that an edge's nodes span; three are a turn.
+const float PANEL = 2.1;
+
+// `from`: |psi| at which the node's panel starts.
+FanNode fan_node(HalfVectorEdge edge, float from, int i)
+{
+    vec2 node = along_edge(i);
+    float width = min(abs(edge.sweep) - from, PANEL);
+    float onward = edge.sweep < 0.0 ? -1.0 : 1.0;
     vec3 b = edge.cone.b;
     mat3 axes = mat3(edge.cone.w1, edge.cone.w2, edge.cone.w3);
     vec2 inverse = 1.0 / (b.xy + b.z);
     vec2 radii = sqrt(b.z * inverse);
     vec2 heights = b.xy * inverse;
-    float angle = edge.sweep * at;
+    float angle = onward * (from + width * node.x);
     vec2 turn = vec2(cos(angle), sin(angle));
     vec2 c = vec2(edge.start.x * turn.x - edge.start.y * turn.y,
                   edge.start.y * turn.x + edge.start.x * turn.y);
     float height = sqrt(dot(heights, c * c));
     float slope = (heights.y - heights.x) * c.x * c.y / max(height, 1e-15);
     return FanNode(axes * vec3(radii * c, height),
-                   (weight * edge.sweep) * (axes * vec3(-radii.x * c.y, radii.y * c.x, slope)));
+                   (onward * width * node.y) *
+                       (axes * vec3(-radii.x * c.y, radii.y * c.x, slope)));
 }
 
 // Sums over the nodes of a fan from the mean half vector.
@@ -65,25 +79,32 @@ struct FanSum {
     vec2 away;      // density times the difference of both weights from the centre's
 };
 
+void add_chord_node(
+    vec3 chord, float k, float s, float weight, vec3 center, vec3 at_center,
+    GgxView view, inout FanSum sum)
+{
+    vec3 at = ggx_weights(center + s * chord, view);
+    float density = weight * k * at.x;
+    sum.density += density;
+    sum.away += density * (at.yz - at_center.yz);
+}
+
+// Nodes along the chord for the weight 2s: Gauss and Jacobi's, or the centre and 3/4.
 void add_fan_node(
     FanNode node, vec3 center, vec3 at_center, GgxView view, inout FanSum sum)
 {
     vec3 chord = node.u - center;
     float k = dot(center, cross(chord, node.du));
 #if GGX_NODES == 2
-    vec3 at = ggx_weights(center + 0.75 * chord, view);
-    float density = 0.888888889 * k * at.x;
-    sum.density += density + 0.111111111 * k * at_center.x;
-    sum.away += density * (at.yz - at_center.yz);
+    add_chord_node(chord, k, 0.75, 0.888888889, center, at_center, view, sum);
+    sum.density += 0.111111111 * k * at_center.x;
+#elif GGX_NODES == 3
+    add_chord_node(chord, k, 0.355051026, 0.363917237, center, at_center, view, sum);
+    add_chord_node(chord, k, 0.844948974, 0.636082763, center, at_center, view, sum);
 #else
-    vec3 at = ggx_weights(center + 0.355051026 * chord, view);
-    float density = 0.363917237 * k * at.x;
-    sum.density += density;
-    sum.away += density * (at.yz - at_center.yz);
-    at = ggx_weights(center + 0.844948974 * chord, view);
-    density = 0.636082763 * k * at.x;
-    sum.density += density;
-    sum.away += density * (at.yz - at_center.yz);
+    add_chord_node(chord, k, 0.212340538, 0.139653960, center, at_center, view, sum);
+    add_chord_node(chord, k, 0.590533136, 0.458482213, center, at_center, view, sum);
+    add_chord_node(chord, k, 0.911412040, 0.401863827, center, at_center, view, sum);
 #endif
 }
 #endif
@@ -208,8 +229,8 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
 }
 
 #if GGX_NODES > 1
-// Edges whose nodes wait for the fan's centre; with more, all are computed again.
-const int STORED_EDGES = 12;
+// Nodes that wait for the fan's centre; with more, all edges are computed again.
+const int STORED_NODES = 12 * GGX_NODES;
 #endif
 
 // Integrals for F = 1 and with the weight (1 - wo.h)^5, light radiance 1.
@@ -227,8 +248,8 @@ vec2 ggx_light_specular(
     float share = 0.0;
 #if GGX_NODES > 1
     FanSum fan = FanSum(0.0, vec2(0.0));
-    FanNode nodes[GGX_NODES * STORED_EDGES];
-    int edges = 0;
+    FanNode nodes[STORED_NODES];
+    int count = 0;
 #endif
     // First the outline's sum, which holds the fan's centre, then the fan.
     for (int round = 0; round < 2; ++round) {
@@ -245,15 +266,17 @@ vec2 ggx_light_specular(
             HalfVectorEdge edge;
             if (light_edge(about, planar, view, edge)) {
 #if GGX_NODES > 1
-                bool stored = round == 0 && edges < STORED_EDGES;
-                for (int i = 0; i < GGX_NODES; ++i) {
-                    if (stored) {
-                        nodes[GGX_NODES * edges + i] = fan_node(edge, i);
-                    } else if (round == 1) {
-                        add_fan_node(fan_node(edge, i), center, at_center, view, fan);
+                for (float from = 0.0; from < abs(edge.sweep); from += PANEL) {
+                    for (int i = 0; i < GGX_NODES; ++i) {
+                        FanNode node = fan_node(edge, from, i);
+                        if (round == 1) {
+                            add_fan_node(node, center, at_center, view, fan);
+                        } else if (count < STORED_NODES) {
+                            nodes[count] = node;
+                        }
+                        ++count;
                     }
                 }
-                edges += 1;
 #endif
                 vector += edge.integral;
             }
@@ -274,15 +297,15 @@ vec2 ggx_light_specular(
 #if GGX_NODES == 1
         break;
 #else
-        if (pinned || edges <= STORED_EDGES) {
+        if (pinned || count <= STORED_NODES) {
             break;
         }
 #endif
     }
     vec2 mean = at_center.yz;
 #if GGX_NODES > 1
-    if (edges <= STORED_EDGES) {
-        for (int i = 0; i < GGX_NODES * edges; ++i) {
+    if (count <= STORED_NODES) {
+        for (int i = 0; i < count; ++i) {
             add_fan_node(nodes[i], center, at_center, view, fan);
         }
     }

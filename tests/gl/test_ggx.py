@@ -50,7 +50,9 @@ STAGE = "a stage of the integral, tested whole by the tests of probe_lights"
 GPU_ONLY = {
     "ggx_weights": STAGE,
     "add_fan_node": STAGE,
-    "add_fan_edge": STAGE,
+    "add_chord_node": STAGE,
+    "along_edge": STAGE,
+    "fan_node": STAGE,
     "ggx_light": STAGE,
     "direction_difference": STAGE,
     "edge_normal": STAGE,
@@ -245,7 +247,7 @@ def on_lamps(
     return which(len(lamps), EACH), np.concatenate(points)
 
 
-@pytest.mark.parametrize("nodes", [1, 2, 3])
+@pytest.mark.parametrize("nodes", [1, 2, 3, 4])
 def test_random_configurations(probe, nodes):
     """Random frames, and lobes aimed at light and outline; half of them isotropic."""
     rng = np.random.default_rng(20161)

@@ -211,7 +211,8 @@ def test_loops_rotate_divide_and_wind(rng: np.random.Generator) -> None:
         assert np.all(np.abs(one) <= np.abs(whole) + 1e-15)
         assert np.all(np.abs(fresnel) <= np.abs(one) + 1e-3)
         other = ggx.ggx_specular([p[:, ::-1]], wo, ax, ay, nodes)
-        np.testing.assert_allclose(other[0], -one, rtol=0.0, atol=1e-8)
+        # Panels start at an edge's start: reversed, the nodes lie a little elsewhere.
+        np.testing.assert_allclose(other[0], -one, rtol=0.0, atol=1e-3)
     scalar = ggx.ggx_specular([p[3]], wo[3], ax[3], ay[3])
     batch = ggx.ggx_specular([p], wo, ax, ay)
     assert scalar[0] == pytest.approx(batch[0][3], rel=1e-12)
@@ -259,14 +260,8 @@ def test_continuity_over_degenerate_frames() -> None:
     assert np.max(np.abs(np.diff(one, 2))) < 1e-9
 
 
-# Isotropic and anisotropic: (mean, p99, max). Anisotropic lobes here reach a ratio of
-# 1000 to 1, where a few nodes cannot follow one edge around the whole lobe.
-LIMITS = {
-    (2, True): (0.0006, 0.009, 0.02),
-    (2, False): (0.0006, 0.012, 0.09),
-    (4, True): (0.0003, 0.004, 0.01),
-    (4, False): (0.0003, 0.004, 0.03),
-}
+# Mean, 99th percentile, largest.
+LIMITS = {2: (0.0006, 0.009, 0.02), 4: (0.0003, 0.004, 0.01)}
 
 
 @pytest.mark.parametrize("isotropic", [True, False])
@@ -282,7 +277,7 @@ def test_specular_against_the_truth(
     assert np.mean(crossing) > 0.3
     truth = reference.specular_integral_batch(p, wo, ax, ay)
     got = ggx.ggx_specular([p], wo, ax, ay, nodes)
-    mean, p99, largest = LIMITS[nodes, isotropic]
+    mean, p99, largest = LIMITS[nodes]
     f04 = [0.04 * (one - fresnel) + fresnel for one, fresnel in (got, truth)]
     for a, b in ((got[0], truth[0]), f04):
         error = np.abs(a - b)
