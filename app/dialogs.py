@@ -121,6 +121,7 @@ class _Browser:
             imgui.open_popup(self._title)
             self._is_new = False
         if not begin_modal(self._title, 40.0, 30.0):
+            self.answer = ""  # something else was opened in its place
             return
         self._places()
         below = 2.0 * imgui.get_frame_height_with_spacing() + 2.8 * em

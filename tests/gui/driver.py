@@ -482,6 +482,12 @@ def unsaved_edits_are_asked_about(app: Application, out: Path) -> None:
     app.click("###cancel")
     assert not app.window.params.app_shall_exit
     assert app.scene == edited
+    app.key(CTRL | imgui.Key.s)
+    assert app.window.dialogs.is_open
+    assert not app.window.params.callbacks.confirm_exit(), "closing the window asks as well"
+    app.click("###cancel")
+    app.frame()
+    assert not app.window.dialogs.is_open, "the question takes the place of the dialog"
     app.key(CTRL | imgui.Key.n)
     app.click("###discard")
     assert app.scene != edited
