@@ -34,8 +34,9 @@ GgxTerms ggx_terms(
 #endif
 #if HAS_DIFFUSE
     CosineTransform diffuse = CosineTransform(tangent_from_world, tangent_from_world);
-    terms.diffuse =
-        max(0.0, light_winding(plane) * light_form_factor(light, diffuse, plane, normal));
+    // A point on the outline itself has no defined form factor, but not above 1.
+    terms.diffuse = clamp(
+        light_winding(plane) * light_form_factor(light, diffuse, plane, normal), 0.0, 1.0);
 #endif
     return terms;
 }

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import moderngl
 import numpy as np
@@ -144,13 +145,16 @@ def reference(
     return specular, diffuse
 
 
-@pytest.fixture
-def probe(ctx: moderngl.Context, tmp_path):
-    """Return (GPU specular, reference, GPU diffuse, reference); nothing may be non-finite."""
+class Probe:
+    """Runs probe_lights for points that each have their own light."""
+
+    def __init__(self, ctx: moderngl.Context, folder: Path) -> None:
+        self.ctx, self.folder = ctx, folder
 
     def run(
-        lamps: Sequence[AreaLight], points: Points, nodes: int = 2
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        self, lamps: Sequence[AreaLight], points: Points, nodes: int = 2
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return GPU specular and diffuse, (n,); nothing may be non-finite or negative."""
         packed = [pack_lights([lamp]) for lamp in lamps]
         texels = np.zeros((len(lamps), max(map(len, packed)), 4), dtype=np.float32)
         for row, data in zip(texels, packed, strict=True):
@@ -176,15 +180,25 @@ def probe(ctx: moderngl.Context, tmp_path):
         }
         features = {**FEATURES, "GGX_NODES": nodes}
         out = evaluate(
-            ctx, tmp_path, ["ggx/shade.glsl"], body, inputs, features, {"lights": texels}, prelude
-        )
-        specular, diffuse = out[:, 0], out[:, 1]
+            self.ctx, self.folder, ["ggx/shade.glsl"], body, inputs, features,
+            {"lights": texels}, prelude,
+        )  # fmt: skip
         assert np.all(np.isfinite(out))
         assert np.all(out >= 0.0)
+        return out[:, 0], out[:, 1]
+
+    def __call__(
+        self, lamps: Sequence[AreaLight], points: Points, nodes: int = 2
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return (GPU specular, reference, GPU diffuse, reference)."""
+        specular, diffuse = self.run(lamps, points, nodes)
         want_specular, want_diffuse = reference(lamps, points, nodes)
         return specular, want_specular, diffuse, want_diffuse
 
-    return run
+
+@pytest.fixture
+def probe(ctx: moderngl.Context, tmp_path: Path) -> Probe:
+    return Probe(ctx, tmp_path)
 
 
 def random_points(
@@ -426,6 +440,57 @@ def test_tangents_that_are_no_tangents(probe):
     points = random_points(rng, lamp, rng.uniform(-2.0, 2.0, aim.shape), mirror=aim)
     points.tangent *= 3.0
     assert errors(probe(lamps, points)).max() <= SPECULAR
+
+
+def test_hostile_points_stay_finite_and_bounded(probe):
+    """On outlines and corners, in the light's plane, along axes, views that graze exactly."""
+    rng = np.random.default_rng(13)
+    lamps = [*some_lamps(rng, 20), CASES["sliver"], CASES["needle"], CASES["bow tie"]]
+    lamp, on = on_lamps(rng, lamps, edge=0.5)
+    corners = np.array(
+        [
+            lamp_points(lamps[i], np.array(lamps[i].outline.contours[0].points)[:3])[k % 3]
+            for k, i in enumerate(lamp)
+        ]
+    )
+    count = len(lamp)
+    for nodes in (1, 2, 3, 4):
+        place = rng.integers(0, 5, (count, 1))
+        nearby = corners + 1e-7 * rng.normal(size=on.shape)
+        places = [on, corners, nearby, 2.0 * on - corners]
+        position = np.select([place == k for k in range(4)], places, rng.normal(size=on.shape))
+        points = random_points(rng, lamp, position, alpha=(1e-4, 1.0), mirror=on + 1e-3)
+        kind = rng.integers(0, 4, (count, 1))
+        flat = np.array([emitting_normal(item) for item in lamps])[lamp]
+        axis = np.eye(3)[rng.integers(0, 3, count)] * rng.choice([-1.0, 1.0], (count, 1))
+        points.normal = np.select([kind == 0, kind == 1], [flat, axis], points.normal)
+        grazing = unit(points.tangent + 1e-4 * points.normal)
+        points.view = np.select([kind == 2, kind == 3], [points.normal, grazing], points.view)
+        points.tangent[::3] = points.normal[::3]
+        specular, diffuse = probe.run(lamps, points, nodes)  # asserts finite and >= 0
+        assert specular.max() <= 1.0
+        assert diffuse.max() <= 1.0
+
+
+@pytest.mark.parametrize("alpha", [0.02, 0.1, 0.5, 1.0])
+def test_a_receding_light_shows_no_seam(probe, alpha):
+    """From 3 to 3,000 times its size: relative precision through the change to the pinned sum."""
+    distance = np.exp(np.linspace(np.log(3.0), np.log(3000.0), 2048))
+    toward = unit(np.array([0.5, 0.2, 1.0]))
+    normal = unit(np.array([0.6, 0.1, 0.3]) - toward)
+    view = -2.0 * normal * (normal @ toward) + toward
+    each = (len(distance), 1)
+    points = Points(
+        which(1, len(distance)),
+        distance[:, None] * toward,
+        np.tile(normal, each),
+        np.tile(unit(np.cross(normal, [1.0, 0.0, 0.0])), each),
+        np.tile(view, each),
+        np.full((len(distance), 2), alpha),
+    )
+    got, want, _, _ = probe([light(STAR, plane=Plane(), two_sided=True)], points)
+    assert np.max(np.abs(got / want - 1.0)) <= 5e-4
+    assert np.max(np.abs(got - want)) <= 2e-6
 
 
 @pytest.fixture
