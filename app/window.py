@@ -25,28 +25,28 @@ from imgui_bundle import hello_imgui, imgui, immapp
 from imgui_bundle.glfw_utils import glfw_window_hello_imgui
 from imgui_bundle.imguizmo import im_guizmo as gizmo
 
-from app import theme
-from app.beginning import first_scene, first_selection
-from app.dialogs import FileDialogs
-from app.documents import Documents
 from app.editor import Editor
-from app.exports import Exports
-from app.keyboard import act_on_keys
-from app.layout import TITLE, docking, runner_params
-from app.menus import edit_menu, file_menu, view_menu
-from app.message_list import draw_messages
-from app.messages import Messages
-from app.panel_windows import PanelWindows
+from app.gui import theme
+from app.gui.beginning import first_scene, first_selection
+from app.gui.dialogs import FileDialogs
+from app.gui.documents import Documents
+from app.gui.exports import Exports
+from app.gui.keyboard import act_on_keys
+from app.gui.layout import TITLE, docking, runner_params
+from app.gui.menus import edit_menu, file_menu, view_menu
+from app.gui.message_list import draw_messages
+from app.gui.messages import Messages
+from app.gui.panel_windows import PanelWindows
+from app.gui.reports import Reports
+from app.gui.shortcuts import Action
+from app.gui.viewport import Viewport
+from app.gui.viewport_window import viewport_window
 from app.panels.performance import performance_panel
 from app.panels.question import unsaved_question
 from app.panels.status import status_bar
 from app.render.renderer import Renderer
 from app.render.techniques import technique_of
-from app.reports import Reports
 from app.scene import Scene
-from app.shortcuts import Action
-from app.viewport import Viewport
-from app.viewport_window import viewport_window
 
 
 class Window:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.documents import Answer
+from app.gui.documents import Answer
 from app.panels.widgets import begin_modal, button
 
 _TITLE = "Unsaved changes"

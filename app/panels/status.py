@@ -5,9 +5,9 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from app.editor import Selection
+from app.gui.shortcuts import key_of
 from app.panels.widgets import MUTED
 from app.scene import Scene
-from app.shortcuts import key_of
 
 
 def help_line(scene: Scene, selection: Selection, tool: str) -> str:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from app.beginning import first_material, first_selection, new_scene
-from app.documents import Documents, FileType
 from app.editor import NOTHING, Editor, Selection
-from app.messages import Messages
+from app.gui.beginning import first_material, first_selection, new_scene
+from app.gui.documents import Documents, FileType
+from app.gui.messages import Messages
 from app.scene import Scene
 from app.scene_io import demo_scenes, load_scene, save_scene
 

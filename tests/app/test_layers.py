@@ -17,13 +17,14 @@ GUI = {"imgui_bundle", "glfw", "implot", "imguizmo"}
 PURE = {
     "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.errors", "app.files",
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
-    "app.lights", "app.planes", "app.step_names", "app.messages", "app.shortcuts",
-    "app.beginning", "app.documents",
+    "app.lights", "app.planes", "app.step_names", "app.gui.messages", "app.gui.shortcuts",
+    "app.gui.beginning", "app.gui.documents",
 }  # fmt: skip
 WINDOW = {
-    "app.window", "app.layout", "app.menus", "app.keyboard", "app.panel_windows",
-    "app.viewport_window", "app.viewport", "app.overlays", "app.placement", "app.dialogs",
-    "app.message_list", "app.exports", "app.reports", "app.theme",
+    "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",
+    "app.gui.viewport_window", "app.gui.viewport", "app.gui.overlays", "app.gui.placement",
+    "app.gui.dialogs", "app.gui.message_list", "app.gui.exports", "app.gui.reports",
+    "app.gui.theme",
 }  # fmt: skip
 TOP = {"app.window", "app.cli", "app.__main__"}
 """What nothing below may import: each starts the program."""
@@ -83,7 +84,7 @@ def forbidden(name: str) -> set[str]:
         return {"app.render", "app.context", "app.panels"} | WINDOW | GL | GUI
     if name.startswith("app.render"):
         return (
-            {"app.panels", "app.editor", "app.edits", "app.documents", "moderngl_window"}
+            {"app.panels", "app.editor", "app.edits", "app.gui.documents", "moderngl_window"}
             | WINDOW
             | GUI
         )
@@ -98,7 +99,7 @@ def forbidden(name: str) -> set[str]:
 
 def test_every_module_has_its_layer() -> None:
     packages = ("ltc", "app.render", "app.panels", "app.cli")
-    known = PURE | WINDOW | TOP | {"app", "app.context"}
+    known = PURE | WINDOW | TOP | {"app", "app.context", "app.gui"}
     homeless = {name for name in MODULES if name not in known and not name.startswith(packages)}
     assert not homeless
     assert known <= set(MODULES)

@@ -6,8 +6,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+from app.gui.reports import Reports
 from app.render.plan import Plan
-from app.reports import Reports
 from app.scene import Camera, RenderSettings, Scene, Shot
 
 SHOT = Shot(Scene(), RenderSettings(), 16, 9)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import get_args
 
-from app.keyboard import chord_of
-from app.shortcuts import KEYS, WHILE_TYPING, Action
+from app.gui.keyboard import chord_of
+from app.gui.shortcuts import KEYS, WHILE_TYPING, Action
 
 
 def test_every_action_has_keys_that_exist_and_belong_to_it_alone() -> None:

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui, immapp
 
-from app import dialogs, planes
+from app import planes
+from app.gui import dialogs
 from app.scene import Scene, Vec3
 from app.window import Window
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from app.gui.viewport import Viewport
 from app.panels.performance import PlanLine, Report
 from app.render.plan import Plan
 from app.render.renderer import Renderer
 from app.scene import Shot
-from app.viewport import Viewport
 
 PASS_NAMES = {
     "gbuffer": "G-buffer",

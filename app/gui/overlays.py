@@ -9,7 +9,8 @@ import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import camera_control as control
-from app import lights, planes, theme
+from app import lights, planes
+from app.gui import theme
 from app.scene import AreaLight, Camera, Vec3
 from app.vectors import add, scale
 

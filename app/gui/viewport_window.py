@@ -7,13 +7,13 @@ from collections.abc import Callable
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
-from app import theme
 from app.editor import Editor
-from app.messages import Messages
+from app.gui import theme
+from app.gui.messages import Messages
+from app.gui.shortcuts import key_of
+from app.gui.viewport import Viewport
 from app.panels.status import help_line
 from app.panels.widgets import button
-from app.shortcuts import key_of
-from app.viewport import Viewport
 
 
 def viewport_window(

@@ -1,6 +1,6 @@
 """Which key does what: one table that keyboard, menus, tooltips and help read.
 
-Free of the GUI, so that panels can name the keys; `app.keyboard` listens to them.
+Free of the GUI, so that panels can name the keys; `app.gui.keyboard` listens to them.
 """
 
 from __future__ import annotations

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Literal, Protocol, TypeAlias
 
 from app import edits
-from app.beginning import new_scene
 from app.editor import Editor, Selection
+from app.gui.beginning import new_scene
+from app.gui.messages import Messages
 from app.meshes import MESH_SUFFIXES, load_mesh
-from app.messages import Messages
 from app.scene import Scene, Transform
 from app.scene_io import demo_scenes, load_scene, save_scene
 

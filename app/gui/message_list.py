@@ -5,8 +5,8 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 
-from app import theme
-from app.messages import Messages
+from app.gui import theme
+from app.gui.messages import Messages
 
 
 def draw_messages(messages: Messages, right: float, bottom: float) -> None:

@@ -1,4 +1,4 @@
-"""Listens to the keys of `app.shortcuts`."""
+"""Listens to the keys of `app.gui.shortcuts`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from imgui_bundle import imgui
 
-from app.shortcuts import KEYS, WHILE_TYPING, Action
+from app.gui.shortcuts import KEYS, WHILE_TYPING, Action
 
 _KEY = imgui.Key
 _NAMED = {"Ctrl": _KEY.mod_ctrl, "Shift": _KEY.mod_shift, "Del": _KEY.delete, "Esc": _KEY.escape}

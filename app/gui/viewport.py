@@ -25,14 +25,15 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle.imguizmo import im_guizmo as gizmo
 
 from app import camera_control as control
-from app import edits, lights, planes, theme
+from app import edits, lights, planes
 from app.editor import NOTHING, Editor, Selection
 from app.errors import InputError
-from app.overlays import HANDLE, Canvas, View, help_line, is_near, middles_of
-from app.placement import box_corners, moved_by, name_of, pose_of, sphere_around
+from app.gui import theme
+from app.gui.overlays import HANDLE, Canvas, View, help_line, is_near, middles_of
+from app.gui.placement import box_corners, moved_by, name_of, pose_of, sphere_around
+from app.gui.shortcuts import key_of
 from app.render.renderer import Hit, Renderer
 from app.scene import AreaLight, Camera, RenderSettings, Scene, SceneError, Shot, Vec2
-from app.shortcuts import key_of
 from app.vectors import add, length, mix, subtract
 
 STILL_SAMPLES = 32

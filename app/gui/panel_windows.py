@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app import edits, step_names
-from app.beginning import first_material
 from app.editor import Editor
+from app.gui.beginning import first_material
 from app.panels.camera import camera_panel
 from app.panels.display import display_panel
 from app.panels.light import light_panel, rename_field

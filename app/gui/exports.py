@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.camera_control import widened
-from app.dialogs import FileDialogs
 from app.editor import Editor
+from app.gui.dialogs import FileDialogs
+from app.gui.messages import Messages
+from app.gui.viewport import Viewport
 from app.images import IMAGE_SUFFIXES, save_image
-from app.messages import Messages
 from app.panels.export import Export, export_dialog, export_progress
 from app.render.renderer import Renderer
 from app.scene import RenderSettings, Scene, Shot
-from app.viewport import Viewport
 
 PICTURE_FILES = ("Pictures", IMAGE_SUFFIXES)
 FRAME_SECONDS = 0.05

@@ -1,4 +1,4 @@
-"""The menu bar. Each item shows the key that `app.shortcuts` has for it."""
+"""The menu bar. Each item shows the key that `app.gui.shortcuts` has for it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import TypeAlias
 from imgui_bundle import hello_imgui, imgui
 
 from app.editor import Editor
+from app.gui.shortcuts import Action, key_of
 from app.scene_io import demo_scenes
-from app.shortcuts import Action, key_of
 
 Actions: TypeAlias = Mapping[Action, Callable[[], None]]
 

@@ -1,0 +1,1 @@
+"""The parts of the window: each does one job for `app.window`, none imports it."""
