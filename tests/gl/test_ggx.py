@@ -46,6 +46,7 @@ TWINS = {
     "double_cosine_of_third",
     "tangent_frame",
     "probe_lights",
+    "shade_lights",
 }
 STAGE = "a stage of the integral, tested whole by the tests of probe_lights"
 GPU_ONLY = {
@@ -63,7 +64,6 @@ GPU_ONLY = {
     "light_edge": STAGE,
     "ggx_light_specular": STAGE,
     "ggx_terms": STAGE,
-    "shade_lights": "the probe's sum weighted by a material",
 }
 
 FEATURES = {
@@ -121,7 +121,7 @@ def frames(at: Points) -> FloatArray:
 
 
 def reference(
-    lamps: Sequence[AreaLight], points: Points, nodes: int
+    lamps: Sequence[AreaLight], points: Points, nodes: int, f0: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """Return (specular, diffuse), each (n,), in float64."""
     at = points.rounded()
@@ -139,8 +139,8 @@ def reference(
         front = np.sum(np.cross(u, v) * (at.position[mine] - origin), axis=-1) > 0.0
         sign = np.where(front, -1.0, 1.0) * (front | lamp.two_sided)
         ax, ay = at.alpha[mine].T
-        one, _ = ggx.ggx_specular(loops, wo[mine], ax, ay, nodes)
-        specular[mine] = np.maximum(0.0, sign * one)
+        one, fresnel = ggx.ggx_specular(loops, wo[mine], ax, ay, nodes)
+        specular[mine] = np.maximum(0.0, sign * (f0 * (one - fresnel) + fresnel))
         diffuse[mine] = np.maximum(0.0, sign * loops_form_factor(loops))
     return specular, diffuse
 
@@ -155,6 +155,19 @@ class Probe:
         self, lamps: Sequence[AreaLight], points: Points, nodes: int = 2
     ) -> tuple[FloatArray, FloatArray]:
         """Return GPU specular and diffuse, (n,); nothing may be non-finite or negative."""
+        body = """
+            vec3 specular;
+            vec3 diffuse;
+            probe_lights(1, position, normal, tangent, wo, alpha, specular, diffuse);
+            result = vec4(specular.x, diffuse.x, 0.0, 0.0);
+        """
+        out = self.evaluate(lamps, points, nodes, body)
+        return out[:, 0], out[:, 1]
+
+    def evaluate(
+        self, lamps: Sequence[AreaLight], points: Points, nodes: int, body: str
+    ) -> FloatArray:
+        """Return the ``result`` of statements that see each point's inputs, (n, 4)."""
         packed = [pack_lights([lamp]) for lamp in lamps]
         texels = np.zeros((len(lamps), max(map(len, packed)), 4), dtype=np.float32)
         for row, data in zip(texels, packed, strict=True):
@@ -162,13 +175,6 @@ class Probe:
         prelude = """
             int light_row;
             vec4 light_texel(int index) { return texelFetch(lights, ivec2(index, light_row), 0); }
-        """
-        body = """
-            light_row = int(lamp);
-            vec3 specular;
-            vec3 diffuse;
-            probe_lights(1, position, normal, tangent, wo, alpha, specular, diffuse);
-            result = vec4(specular.x, diffuse.x, 0.0, 0.0);
         """
         inputs = {
             "lamp": points.lamp,
@@ -180,12 +186,12 @@ class Probe:
         }
         features = {**FEATURES, "GGX_NODES": nodes}
         out = evaluate(
-            self.ctx, self.folder, ["ggx/shade.glsl"], body, inputs, features,
-            {"lights": texels}, prelude,
+            self.ctx, self.folder, ["ggx/shade.glsl"], f"light_row = int(lamp); {body}", inputs,
+            features, {"lights": texels}, prelude,
         )  # fmt: skip
         assert np.all(np.isfinite(out))
         assert np.all(out >= 0.0)
-        return out[:, 0], out[:, 1]
+        return out
 
     def __call__(
         self, lamps: Sequence[AreaLight], points: Points, nodes: int = 2
@@ -277,6 +283,23 @@ def test_random_configurations(probe, nodes):
             # The few above 1e-4 have an alpha of .001 at a cosine below .01.
             assert error.max() <= 2.0 * SPECULAR
             assert np.quantile(error, 0.99) <= 3e-5
+
+
+def test_fresnel_and_diffuse_of_a_material(probe):
+    rng = np.random.default_rng(14)
+    lamps = some_lamps(rng)
+    lamp, aim = on_lamps(rng, lamps, edge=0.3)
+    points = random_points(rng, lamp, rng.uniform(-2.0, 2.0, aim.shape), mirror=aim)
+    body = """
+        MaterialSample material = MaterialSample(vec3(0.5), vec3(0.04), alpha);
+        result.x = shade_lights(1, position, normal, tangent, wo, material).x;
+        material.f0 = vec3(0.0);
+        result.y = shade_lights(1, position, normal, tangent, wo, material).x;
+    """
+    got = probe.evaluate(lamps, points, 2, body)
+    specular, diffuse = reference(lamps, points, 2, f0=0.04)
+    np.testing.assert_allclose(got[:, 0], specular + 0.5 * diffuse, rtol=0, atol=SPECULAR)
+    np.testing.assert_allclose(got[:, 1], 0.5 * diffuse, rtol=0, atol=5e-6)  # f0 = 0: no lobe
 
 
 @pytest.mark.parametrize("alpha, p99, largest", [(1e-2, 2e-5, 1e-4), (1e-3, 1e-4, 1e-3),
