@@ -482,6 +482,10 @@ def ggx_specular(
     87 to 89            .00077 / .0129 / .021  .00026 / .0047 / .008
     ==================  =====================  =====================
 
+    Stars, rings and letters err by half as much (2,500 each; 4 nodes .00003 / .0008 / .008).
+    Worst are planes 1e4 wide half a metre away: .0019 / .016 / .024 with 2 nodes,
+    .0005 / .004 / .006 with 4.
+
     Median relative error where the value exceeds 5 % of the largest: 6e-5 and 1e-5. All of
     it is the mean's: F itself is exact to 1e-9.
 

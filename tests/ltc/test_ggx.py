@@ -288,6 +288,29 @@ def test_specular_against_the_truth(
     assert np.median(np.abs(got[0][bright] / truth[0][bright] - 1.0)) <= 0.003
 
 
+@pytest.mark.parametrize("nodes", [2, 4])
+def test_holes_and_concave_outlines_against_the_truth(rng: np.random.Generator, nodes: int) -> None:
+    """A ring, whose fan has its centre in the hole, and an L."""
+    t = np.arange(16) * np.pi / 8.0
+    circle = np.stack([np.cos(t), np.sin(t)], axis=-1)
+    angle = np.array([[-1, -1], [1, -1], [1, -0.5], [-0.4, -0.5], [-0.4, 1], [-1, 1]], dtype=float)
+    n = 300
+    wo, (ax, ay) = views(rng, n), alphas(rng, n, 1e-3, isotropic=False)
+    for outline in ([circle, 0.6 * circle[::-1]], [angle]):
+        state = rng.bit_generator.state
+        loops = []
+        for loop in outline:
+            rng.bit_generator.state = state  # both in one plane
+            loops.append(placed(rng, loop, wo))
+        parts = [reference.specular_integral_batch(loop, wo, ax, ay)[0] for loop in loops]
+        got, _ = ggx.ggx_specular(loops, wo, ax, ay, nodes)
+        error = np.abs(got - sum(parts))
+        mean, p99, largest = LIMITS[nodes]
+        assert np.mean(error) <= mean
+        assert np.quantile(error, 0.99) <= p99
+        assert error.max() <= largest
+
+
 def test_mirror_like_lobes_are_exact(rng: np.random.Generator) -> None:
     n = 100
     wo = views(rng, n, 80.0)
