@@ -39,12 +39,12 @@ vec2 light_form_factors(PlanarLight light, SurfacePoint point, CosineTransform s
     float winding = light_winding(view);
     vec2 factors = vec2(0.0);
 #if HAS_SPECULAR
-    factors.x = max(0.0, winding * light_form_factor(light, specular, view, normal));
+    factors.x = clamp(winding * light_form_factor(light, specular, view, normal), 0.0, 1.0);
 #endif
 #if HAS_DIFFUSE
     mat3 shading_from_world = transpose(world_from_shading);
     CosineTransform diffuse = CosineTransform(shading_from_world, shading_from_world);
-    factors.y = max(0.0, winding * light_form_factor(light, diffuse, view, normal));
+    factors.y = clamp(winding * light_form_factor(light, diffuse, view, normal), 0.0, 1.0);
 #endif
     return factors;
 }
