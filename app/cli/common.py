@@ -208,7 +208,9 @@ class Steps:
     def done(self, count: int) -> None:
         """Say how many of the steps are done."""
         self.count = count
-        if self._progress is None and time.monotonic() - self._start > PROGRESS_AFTER:
+        late = time.monotonic() - self._start > PROGRESS_AFTER
+        # Elsewhere than on a terminal rich would leave a blank line for the bar.
+        if self._progress is None and late and messages().is_terminal:
             self._progress = Progress(
                 TextColumn("{task.description}"),
                 BarColumn(),
