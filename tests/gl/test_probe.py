@@ -302,16 +302,13 @@ def test_exactly_zero_behind_a_one_sided_light(renderer):
 
 @pytest.mark.parametrize("distance", [1e-3, 1e-4, 1e-5])
 def test_close_to_an_edge(renderer, distance):
-    """Within a millimetre of the outline, in every direction around it."""
+    """Within a millimetre of the outline, in every direction around it, alpha from .001."""
     rng = np.random.default_rng(7)
     for _ in range(10):
         lamp = random_light(rng, two_sided=True)
         near = on_light(rng, lamp, 64, edge=1.0)
         position = near + distance * unit(rng.normal(size=(64, 3)))
-        points = random_points(rng, 64, position, alpha=(0.05, 1.0))
-        # The outline itself is known to a rounding of its coordinates, 1e-7 m: seen from
-        # a distance d that is an angle of 1e-7 / d, magnified by the lobe's 1 / alpha.
-        check(renderer, lamp, points, specular=max(SPECULAR, 2e-9 / distance / 0.05))
+        check(renderer, lamp, random_points(rng, 64, position))
 
 
 def test_in_the_plane_of_the_light(renderer):
