@@ -69,6 +69,7 @@ import numpy.typing as npt
 
 from ltc import brdf
 from ltc.polygon import clip_to_horizon
+from ltc.quadrature import gauss_legendre
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
@@ -397,13 +398,6 @@ def visible_normal_share(
 
 
 @lru_cache(maxsize=8)
-def _along(n: int) -> tuple[FloatArray, FloatArray]:
-    """Return Gauss-Legendre nodes and weights on [0, 1]."""
-    x, w = np.polynomial.legendre.leggauss(n)
-    return 0.5 * (x + 1.0), 0.5 * w
-
-
-@lru_cache(maxsize=8)
 def _radial(n: int) -> tuple[FloatArray, FloatArray]:
     """Return nodes and weights for the weight 2s ds on [0, 1], exact to degree 2n - 1.
 
@@ -522,7 +516,7 @@ def ggx_specular(
         cone, c0, s0, sweep = edges.cone, edges.cosine, edges.sine, edges.sweep
         s, ws = (np.array([0.75]), np.array([8 / 9])) if nodes == 2 else _radial(nodes - 1)
         # Panels of a third of a turn and one of what is left, so that none appears with a jump.
-        x, wx = _along(nodes)
+        x, wx = gauss_legendre(nodes)
         turn = np.abs(sweep)[..., None, None]
         starts = np.arange(3.0)[:, None] * _PANEL
         width = np.clip(turn - starts, 0.0, _PANEL)

@@ -34,6 +34,7 @@ import numpy.typing as npt
 
 from ltc import brdf
 from ltc.polygon import clip_to_horizon
+from ltc.quadrature import gauss_legendre
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.intp]
@@ -253,7 +254,7 @@ def specular_area_integral(
             continue
         previous, change, cells = np.full(2, np.inf), np.inf, 1
         while change > tolerance and cells <= 128:
-            x, w = _gauss(6)
+            x, w = gauss_legendre(6)
             x = ((np.arange(cells)[:, None] + x) / cells).ravel()
             w = np.tile(w / cells, cells)
             s, t = x[:, None], x[None, :]
@@ -365,13 +366,6 @@ _MAX_SPLITS = 20
 """Rounds of halving that an error estimate may ask for."""
 
 
-@lru_cache(maxsize=16)
-def _gauss(n: int) -> tuple[FloatArray, FloatArray]:
-    """Return Gauss-Legendre nodes and weights on [0, 1]."""
-    x, w = np.polynomial.legendre.leggauss(n)
-    return 0.5 * (x + 1.0), 0.5 * w
-
-
 def _core(
     a: FloatArray,
     b: FloatArray,
@@ -424,7 +418,7 @@ def _core(
         return ready
 
     legendre = _legendre(nodes)
-    x, w = _gauss(nodes)
+    x, w = gauss_legendre(nodes)
     centre: FloatArray | None = None
     e, lo, hi = _panels(sweep, edge_ready)
     for last in range(_MAX_SPLITS, -1, -1):
@@ -480,7 +474,7 @@ def _chords(
             ok &= _smith_pole(wi, dwi[:, 2], v, sf, half, t)
         return ok
 
-    x, w = _gauss(nodes)
+    x, w = gauss_legendre(nodes)
     legendre = _legendre(nodes)
     sums, errors = np.zeros((2, k.size)), np.zeros(k.size)
     f, lo, hi = _panels(np.ones(k.shape), ready)

@@ -11,17 +11,15 @@ from app.scene import (
     AreaLight,
     Camera,
     Material,
-    Outline,
     Plane,
-    PolygonContour,
     RenderSettings,
     Scene,
     SceneObject,
     Shot,
     Transform,
 )
+from tests.gl.scenes import SQUARE
 
-SQUARE = Outline((PolygonContour(((-1, -1), (1, -1), (1, 1), (-1, 1))),))
 WHITE = Material("white", (0.8, 0.8, 0.8), (0.04, 0.04, 0.04), (0.3, 0.3))
 
 

@@ -10,17 +10,15 @@ import pytest
 from app.scene import (
     AreaLight,
     Material,
-    Outline,
     Plane,
-    PolygonContour,
     RenderSettings,
     Scene,
     SceneObject,
     Shot,
     Transform,
 )
+from tests.gl.scenes import SQUARE
 
-SQUARE = Outline((PolygonContour(((-1, -1), (1, -1), (1, 1), (-1, 1))),))
 PLAIN = Material("m", (0.2, 0.2, 0.2), (0.5, 0.5, 0.5), (0.2, 0.2))
 BRUSHED = replace(PLAIN, alpha=(0.05, 0.4))
 MATT = replace(BRUSHED, f0=(0.0, 0.0, 0.0))
