@@ -203,11 +203,11 @@ class Window:
         view_menu(self._actions, self.viewport.show_overlays, self.params.docking_params)
 
     def _status(self) -> None:
-        step, shot = self.editor.undo_name, self.viewport.shot
+        step, shot = self.editor.undo_name, self.viewport.picture.shot
         size = (shot.width, shot.height) if shot is not None else (0, 0)
         text = f"Last edit: {step}" if step else "Drag the picture to look around"
         technique = technique_of(self.editor.scene, self.viewport.settings.technique)
-        status_bar(text, self.viewport.samples, size, technique)
+        status_bar(text, self.viewport.picture.samples, size, technique)
 
     # --- docked windows -------------------------------------------------------------
 
@@ -219,7 +219,7 @@ class Window:
         self.viewport.settings = self._panels.display(self.viewport.settings)
 
     def _performance_window(self) -> None:
-        shot = self.viewport.shot
+        shot = self.viewport.picture.shot
         if shot is not None:
             performance_panel(self._reports.of(shot, self.viewport, self.renderer))
 

@@ -34,10 +34,10 @@ class Reports:
         times = renderer.timings(wait=False).items()
         return Report(
             passes=tuple((PASS_NAMES.get(name, name), value) for name, value in times),
-            history=tuple(viewport.history),
+            history=tuple(viewport.picture.history),
             gpu=str(renderer.ctx.info["GL_RENDERER"]),
             size=(shot.width, shot.height),
-            samples=viewport.samples,
+            samples=viewport.picture.samples,
             plan=self._plan,
         )
 

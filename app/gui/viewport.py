@@ -3,10 +3,6 @@
 One frame goes: pointer and keys change the scene through the editor, the
 renderer adds a sample of that scene, the picture and the outlines and handles
 over it are drawn. So what lies over the picture always belongs to it.
-
-While something moves, each frame shows one fresh sample, smaller where a
-full-size one takes longer than `SLOW`. When nothing moves, samples gather up to
-the wanted number, and then no pass runs at all.
 """
 
 from __future__ import annotations
@@ -14,12 +10,8 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-import traceback
-from collections import deque
 from dataclasses import dataclass, replace
-from typing import Protocol
 
-import moderngl
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle.imguizmo import im_guizmo as gizmo
@@ -29,6 +21,7 @@ from app import edits, lights, planes
 from app.editor import NOTHING, Editor, Selection
 from app.errors import InputError
 from app.gui import theme
+from app.gui.live_picture import LivePicture, Reporter
 from app.gui.overlays import HANDLE, Canvas, View, help_line, is_near, middles_of
 from app.gui.placement import box_corners, moved_by, name_of, pose_of, sphere_around
 from app.gui.shortcuts import key_of
@@ -38,15 +31,6 @@ from app.vectors import add, length, mix, subtract
 
 STILL_SAMPLES = 32
 """How many samples per pixel a still picture gathers unless told otherwise."""
-SLOW = 0.045
-"""Seconds for a full-size sample from which on moving pictures are smaller."""
-SETTLE = 0.2
-"""Seconds without movement after which a smaller picture becomes full-size; more, up to
-`LONGEST_SETTLE`, where a full-size sample takes longer than that."""
-LONGEST_SETTLE = 1.0
-
-SMALLEST = 4
-"""Most that width and height of a moving picture are divided by."""
 UNDER_STATUS_BAR = 1
 """Points by which hello_imgui's status bar covers the docked windows."""
 
@@ -58,12 +42,6 @@ MOST_ASKED = 64
 """How many corners of a light are asked whether they are behind something."""
 ASKING = 0.004
 """Seconds per frame for asking."""
-
-
-class Reporter(Protocol):
-    """Where sentences for the user go."""
-
-    def failure(self, text: str) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +68,7 @@ class Viewport:
     Parameters
     ----------
     renderer : Renderer
-        Renders and picks; this class alone decides when.
+        Picks, and renders what `LivePicture` asks for.
     reporter : Reporter
         Gets the failures of rendering and editing.
     """
@@ -100,9 +78,8 @@ class Viewport:
         self.tool = "move"
         self.show_overlays = True
         self.help = ""
-        self.samples = (0, 0)
-        self.history: deque[float] = deque(maxlen=120)
         self.view = View(0.0, 0.0, 1.0, 1.0, (1, 1))
+        self.picture = LivePicture(renderer, reporter)
         self._renderer = renderer
         self._reporter = reporter
         self._corner: CornerDrag | None = None
@@ -110,19 +87,12 @@ class Viewport:
         self._gizmo_hovered = False
         self._unit = 1.0
         self._moved = 0.0
-        self._shot: Shot | None = None
-        self._wanted: Scene | None = None
-        self._shown: tuple[Scene, Camera, Scene] | None = None
-        self._failed: Shot | None = None
-        self._full_size_seconds = 0.0
-        self._divisor = 1
         self._hidden: frozenset[tuple[int, int]] = frozenset()
         self._unasked: list[tuple[tuple[int, int], Vec2]] = []
         self._is_asking = False
         self._occlusion_of: tuple[Shot | None, int] | None = None
         self._hovered_light: int | None = None
         self._asked: Hit | None = None
-        self._changed_at = 0.0
 
     # --- the outside ----------------------------------------------------------
 
@@ -134,24 +104,12 @@ class Viewport:
     @property
     def is_settled(self) -> bool:
         """Whether the picture has all its samples at full size and shows the present scene."""
-        if self._failed is not None:
-            return True
-        shot = self._shot
-        return (
-            shot is not None
-            and self.samples[0] >= self.samples[1]
-            and (shot.width, shot.height) == self.view.pixels
-        )
+        return self.picture.is_settled(self.view.pixels)
 
     @property
     def is_idle(self) -> bool:
         """Whether nothing is left to do until the user does something."""
         return self.is_settled and not self._is_asking
-
-    @property
-    def shot(self) -> Shot | None:
-        """What the picture shows."""
-        return self._shot
 
     def frame(self, editor: Editor) -> None:
         """Turn the camera's attention to what is selected, or to the whole scene."""
@@ -175,8 +133,9 @@ class Viewport:
         if self.show_overlays and self._gizmo is None:
             self._handles(editor)
         self._canvas(editor)
-        self._render(editor.scene, self.settings)
-        self._picture()
+        scene = editor.scene
+        self.picture.render(scene, self.camera_of(scene), self.settings, self.view.pixels)
+        self.picture.draw(self.view)
         self._is_asking = False
         if self.show_overlays:
             self._overlays(editor)
@@ -254,8 +213,8 @@ class Viewport:
 
     def _hit(self, x: float, y: float) -> Hit | None:
         """Return what the picture shows at screen coordinates."""
-        view, shot = self.view, self._shot
-        if shot is None or self._failed is not None or not view.contains(x, y):
+        view, shot = self.view, self.picture.shot
+        if shot is None or self.picture.has_failed or not view.contains(x, y):
             return None
         hit = self._renderer.pick(
             (x - view.x) / view.width * shot.width, (y - view.y) / view.height * shot.height
@@ -455,64 +414,6 @@ class Viewport:
             moved = moved_by(drag.scene, drag.selection, motion)
             editor.update(replace(moved, camera=scene.camera))
 
-    # --- rendering -----------------------------------------------------------------
-
-    def _render(self, scene: Scene, settings: RenderSettings) -> None:
-        """Add a sample unless the picture has all of them; never let a failure out."""
-        now = time.monotonic()
-        if self._wanted is None or _other_radiance(self._wanted, scene):
-            self._changed_at = now
-        self._wanted = scene
-        patience = min(max(SETTLE, self._full_size_seconds), LONGEST_SETTLE)
-        moving = now - self._changed_at < patience
-        width, height = self.view.pixels
-        divisor = 1
-        if moving and self._full_size_seconds > SLOW:
-            divisor = min(math.ceil(math.sqrt(self._full_size_seconds / SLOW)), SMALLEST)
-        width, height = math.ceil(width / divisor), math.ceil(height / divisor)
-        camera = self.camera_of(scene)
-        if self._shown is None or self._shown[0] is not scene or self._shown[1] != camera:
-            self._shown = (scene, camera, replace(scene, camera=camera))
-        shot = Shot(self._shown[2], replace(settings, samples=1), width, height)
-        if shot == self._failed:
-            return
-        if shot == self._shot and self.samples[0] >= settings.samples:
-            return
-        try:
-            began = time.perf_counter()
-            samples = self._renderer.accumulate(shot, settings.samples)
-            seconds = time.perf_counter() - began
-        except Exception as failure:
-            if not isinstance(failure, InputError):
-                traceback.print_exc()
-            self._failed, self.samples = shot, (0, settings.samples)
-            self._reporter.failure(str(failure) or type(failure).__name__)
-            return
-        finally:
-            self._renderer.ctx.screen.use()
-        self._failed, self._shot, self.samples = None, shot, (samples, settings.samples)
-        timings = self._renderer.timings(wait=False)
-        gpu = sum(value for name, value in timings.items() if name != "cpu") / 1e3
-        self.history.append(1e3 * max(seconds, gpu))
-        # The GPU's figures are those of the sample before, the size of which counts.
-        self._full_size_seconds = seconds + gpu * self._divisor**2
-        self._divisor = divisor
-
-    def _picture(self) -> None:
-        view, draw = self.view, imgui.get_window_draw_list()
-        low, high = ImVec2(view.x, view.y), ImVec2(view.x + view.width, view.y + view.height)
-        if self._shot is None or self._failed is not None:
-            draw.add_rect_filled(low, high, theme.u32(theme.grey(0.07)))
-            return
-        texture = self._renderer.texture
-        self._renderer.ctx.screen.use()
-        same_size = texture.size == view.pixels
-        kind = moderngl.NEAREST if same_size else moderngl.LINEAR
-        if texture.filter != (kind, kind):
-            texture.filter = (kind, kind)
-        reference = imgui.ImTextureRef(texture.glo)
-        draw.add_image(reference, low, high, ImVec2(0.0, 1.0), ImVec2(1.0, 0.0))
-
     # --- over the picture -------------------------------------------------------------
 
     def _overlays(self, editor: Editor) -> None:
@@ -562,8 +463,8 @@ class Viewport:
     def _find_hidden(self, scene: Scene, index: int) -> None:
         """Find out, a few at a time once nothing moves, which corners are behind something."""
         light, camera = scene.lights[index], self.camera_of(scene)
-        if self._occlusion_of != (self._shot, index):
-            self._occlusion_of = (self._shot, index)
+        if self._occlusion_of != (self.picture.shot, index):
+            self._occlusion_of = (self.picture.shot, index)
             self._unasked = lights.vertices_of(light)[:MOST_ASKED]
         end = time.perf_counter() + ASKING
         while self._unasked and time.perf_counter() < end:
@@ -579,16 +480,6 @@ class Viewport:
             )
             self._hidden = self._hidden | {vertex} if behind else self._hidden - {vertex}
         self._is_asking = bool(self._unasked)
-
-
-def _other_radiance(a: Scene, b: Scene) -> bool:
-    """Tell whether two scenes may differ in more than exposure and tone map."""
-    return not (
-        a.camera is b.camera
-        and a.lights is b.lights
-        and a.objects is b.objects
-        and a.materials is b.materials
-    )
 
 
 def _remove_outline(light: AreaLight, vertex: tuple[int, int]) -> AreaLight:

@@ -24,7 +24,7 @@ WINDOW = {
     "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",
     "app.gui.viewport_window", "app.gui.viewport", "app.gui.overlays", "app.gui.placement",
     "app.gui.dialogs", "app.gui.message_list", "app.gui.exports", "app.gui.reports",
-    "app.gui.theme",
+    "app.gui.theme", "app.gui.live_picture",
 }  # fmt: skip
 TOP = {"app.window", "app.cli", "app.__main__"}
 """What nothing below may import: each starts the program."""

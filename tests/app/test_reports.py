@@ -25,7 +25,9 @@ def test_a_plan_is_made_anew_when_something_else_is_needed_and_only_then() -> No
         timings=lambda wait: {"gbuffer": 0.5},
         ctx=SimpleNamespace(info={"GL_RENDERER": "none"}),
     )
-    viewport: Any = SimpleNamespace(settings=RenderSettings(), history=[], samples=(1, 4))
+    viewport: Any = SimpleNamespace(
+        settings=RenderSettings(), picture=SimpleNamespace(history=[], samples=(1, 4))
+    )
     reports = Reports()
 
     def report(shot: Shot) -> int:

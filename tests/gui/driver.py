@@ -394,7 +394,7 @@ def save_and_open_by_the_dialog(app: Application, out: Path) -> None:
 
 def same_picture_as_headless(app: Application, out: Path) -> None:
     picture = app.picture()
-    shot = app.window.viewport.shot
+    shot = app.window.viewport.picture.shot
     assert shot is not None
     shot = replace(shot, settings=replace(shot.settings, samples=SAMPLES))
     (out / "shot.pickle").write_bytes(pickle.dumps(shot))
@@ -403,7 +403,7 @@ def same_picture_as_headless(app: Application, out: Path) -> None:
 
 def idle_when_nothing_changes(app: Application, out: Path) -> None:
     passes = app.window.renderer.lighting_passes
-    assert app.window.viewport.samples == (SAMPLES, SAMPLES)
+    assert app.window.viewport.picture.samples == (SAMPLES, SAMPLES)
     for _ in range(30):
         app.frame()
     assert app.window.renderer.lighting_passes == passes
@@ -421,7 +421,7 @@ def export_pictures(app: Application, out: Path) -> None:
         app.until(lambda: not app.window.exports.is_busy)
         assert (out / f"picture.{kind}").is_file()
     shot = replace(
-        app.window.viewport.shot,
+        app.window.viewport.picture.shot,
         scene=SCENE,
         settings=replace(app.window.viewport.settings, samples=2),
         width=160,
@@ -461,7 +461,7 @@ def failures_become_messages(app: Application, out: Path) -> None:
     assert any("missing.glb" in message.text for message in app.window.messages.shown)
     app.key(CTRL | imgui.Key.z)
     app.settle()
-    assert app.window.viewport.samples == (SAMPLES, SAMPLES)
+    assert app.window.viewport.picture.samples == (SAMPLES, SAMPLES)
 
 
 def meshes_can_be_dropped(app: Application, out: Path) -> None:
