@@ -22,8 +22,14 @@ Quaternion: TypeAlias = tuple[float, float, float, float]
 FillRule: TypeAlias = Literal["evenodd", "nonzero"]
 ToneMap: TypeAlias = Literal["agx", "aces", "reinhard", "none"]
 
+CubicCurve: TypeAlias = tuple[Vec2, Vec2, Vec2, Vec2]
+TextAlign: TypeAlias = Literal["left", "center", "right"]
+AnchorKind: TypeAlias = Literal["corner", "smooth", "symmetric"]
+
 FILL_RULES: tuple[FillRule, ...] = ("evenodd", "nonzero")
 TONE_MAPS: tuple[ToneMap, ...] = ("agx", "aces", "reinhard", "none")
+ANCHOR_KINDS: tuple[AnchorKind, ...] = ("corner", "smooth", "symmetric")
+TEXT_ALIGNS: tuple[TextAlign, ...] = ("left", "center", "right")
 BUILT_IN_MESHES = ("plane", "sphere", "disc", "box")
 
 ALPHA_MIN = 1e-4
@@ -184,8 +190,56 @@ class PolygonContour:
             _finite("polygon", f"point {i}", point, 2)
 
 
-Contour: TypeAlias = PolygonContour
-"""One closed curve of an outline. Bézier contours join this union."""
+@dataclass(frozen=True, slots=True)
+class BezierContour:
+    """A closed chain of cubic Bézier curves in plane coordinates (s, t), any winding.
+
+    Each curve is (start anchor, handle, handle, end anchor) and begins exactly
+    where the one before it ends. A straight line has its handles on the chord.
+
+    ``kinds`` says how the editor keeps the handles at the anchor where curve i
+    begins: free (``corner``), in line (``smooth``), or in line and equally long
+    (``symmetric``). Empty means all corners.
+    """
+
+    curves: tuple[CubicCurve, ...]
+    kinds: tuple[AnchorKind, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.curves:
+            raise SceneError("bezier has no curves, expected one or more")
+        for i, curve in enumerate(self.curves):
+            if len(curve) != 4:
+                raise SceneError(f"bezier: curve {i} has {len(curve)} points, expected 4")
+            for j, point in enumerate(curve):
+                _finite("bezier", f"curve {i}, point {j}", point, 2)
+        for i, curve in enumerate(self.curves):
+            before = self.curves[i - 1][3]
+            if curve[0] != before:
+                raise SceneError(
+                    f"bezier: curve {i} begins at {curve[0]}, expected {before}, "
+                    "where the one before it ends"
+                )
+        if self.kinds and len(self.kinds) != len(self.curves):
+            raise SceneError(
+                f"bezier: there are {len(self.kinds)} kinds for {len(self.curves)} anchors, "
+                "expected one for each"
+            )
+        for kind in self.kinds:
+            if kind not in ANCHOR_KINDS:
+                raise SceneError(
+                    f"bezier: '{kind}' is no kind of anchor, expected one of "
+                    f"{', '.join(ANCHOR_KINDS)}"
+                )
+
+    @property
+    def anchors(self) -> tuple[Vec2, ...]:
+        """Where the curves begin."""
+        return tuple(curve[0] for curve in self.curves)
+
+
+Contour: TypeAlias = PolygonContour | BezierContour
+"""One closed curve of an outline."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,10 +259,57 @@ class Outline:
 
 
 @dataclass(frozen=True, slots=True)
+class TextSource:
+    """What a text light's outline was made from; `app.text` makes it again.
+
+    ``font`` is an absolute file path, or empty for the font in ``assets/``;
+    ``size`` is the em in units of the plane, ``line_height`` in ems, ``spacing``
+    what is added between letters, in ems. Lines end with ``\\n``.
+    """
+
+    text: str
+    font: str = ""
+    size: float = 1.0
+    align: TextAlign = "center"
+    spacing: float = 0.0
+    line_height: float = 1.2
+
+    def __post_init__(self) -> None:
+        for field in ("size", "spacing", "line_height"):
+            _finite("text", field, (getattr(self, field),), 1)
+        if not self.size > 0.0:
+            raise SceneError(f"text: size is {self.size:g}, expected a number above 0")
+        if self.align not in TEXT_ALIGNS:
+            raise SceneError(
+                f"text: align is '{self.align}', expected one of {', '.join(TEXT_ALIGNS)}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class SvgSource:
+    """The file (absolute path) that a light's outline was read from.
+
+    ``size`` is the longer side of the drawing in units of the plane.
+    """
+
+    path: str
+    size: float = 2.0
+
+    def __post_init__(self) -> None:
+        _finite("svg", "size", (self.size,), 1)
+        if not self.size > 0.0:
+            raise SceneError(f"svg: size is {self.size:g}, expected a number above 0")
+
+
+OutlineSource: TypeAlias = TextSource | SvgSource
+
+
+@dataclass(frozen=True, slots=True)
 class AreaLight:
     """A planar light that emits constant radiance towards u x v, or to both sides.
 
-    ``visible`` says whether the camera sees the light itself.
+    ``visible`` says whether the camera sees the light itself. ``source`` is what the
+    outline was made from, if it was; editing the outline itself forgets it.
     """
 
     name: str
@@ -217,6 +318,7 @@ class AreaLight:
     radiance: Vec3 = (1.0, 1.0, 1.0)
     two_sided: bool = False
     visible: bool = True
+    source: OutlineSource | None = None
 
     def __post_init__(self) -> None:
         _non_negative(f"light '{self.name}'", "radiance", self.radiance)
