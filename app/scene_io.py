@@ -6,9 +6,9 @@ in it (``lights[0].outline.contours[1].polygon[2]``, or line and column where
 the JSON itself is broken), what was found and what was expected.
 
 Reading is a walk over the parsed JSON with one small function per part, next
-to the function that writes that part. What later versions add (Bézier
-contours, textures, text and SVG sources) has its key named in `_LATER`, so
-that this version says plainly that it cannot read it.
+to the function that writes that part. What later versions add has its
+key named in `_LATER`, so that this version says plainly that it cannot
+read it.
 
 Numbers keep their text while reading. Angles need that: degrees times pi/180
 in float64 skips some radians, so that not every scene could be written. A
@@ -33,12 +33,16 @@ from app.errors import InputError, describe, expected_one_of, nearest, os_reason
 from app.files import replace_file
 from app.meshes import check_mesh_path
 from app.scene import (
+    ANCHOR_KINDS,
     BUILT_IN_MESHES,
     FILL_RULES,
     TONE_MAPS,
+    AnchorKind,
     AreaLight,
+    BezierContour,
     Camera,
     Contour,
+    CubicCurve,
     Display,
     Material,
     Outline,
@@ -66,16 +70,13 @@ LARGEST_NUMBER = 1e15
 LARGEST_FILE = 256 * 2**20
 """Bytes of a scene file; anything larger is not a scene."""
 
+SNAP = 1e-6
+"""Curves whose ends lie closer than this share of their contour's extent meet there."""
+
 LINE_LENGTH = 100
 """Columns of a written file; names and long numbers may exceed it."""
 
-_LATER = {
-    "bezier": "Bézier contours",
-    "texture": "textured lights",
-    "text": "text lights",
-    "svg": "SVG lights",
-    "source": "text and SVG sources",
-}
+_LATER = {"texture": "textured lights", "text": "text lights", "svg": "SVG lights"}
 """Keys of the format that this version does not support, and what they stand for."""
 
 _DECIMAL = Context(prec=60)
@@ -291,7 +292,7 @@ def _fields(value: Any, place: str, known: Iterable[str], kind: str) -> _Object:
             raise _PlaceError(
                 _step(place, key),
                 f"{_LATER[key]} are not supported by this version, "
-                "expected polygons of constant radiance",
+                "expected lights of constant radiance",
             )
         guess = nearest(key, known)
         meant = f" (did you mean '{guess}'?)" if guess else ""
@@ -575,15 +576,92 @@ def _outline(value: Any, place: str) -> Outline:
 
 
 def _contour(value: Any, place: str) -> Contour:
-    fields = _fields(value, place, ("polygon",), "a contour")
-    if "polygon" not in fields:
+    fields = _fields(value, place, ("polygon", "bezier", "kinds"), "a contour")
+    given = [key for key in ("polygon", "bezier") if key in fields]
+    if len(given) != 1:
+        found = "both polygon and bezier" if given else "neither polygon nor bezier"
         raise _PlaceError(
-            place, 'the key "polygon" is missing, expected {"polygon": [[s, t], ...]}'
+            place,
+            f'found {found}, expected {{"polygon": [[s, t], ...]}} or '
+            '{"bezier": [[[s, t], [s, t], [s, t], [s, t]], ...]}',
+        )
+    if given == ["bezier"]:
+        return _bezier(fields, place)
+    if "kinds" in fields:
+        raise _PlaceError(
+            _step(place, "kinds"),
+            "found kinds of anchors for a polygon, expected them for a bezier",
         )
     at = _step(place, "polygon")
     items = _list(fields["polygon"], at, "points [s, t]")
     points = tuple(_vec2(item, f"{at}[{i}]", "[s, t]") for i, item in enumerate(items))
     return _build(at, "polygon", PolygonContour, points=points)
+
+
+def _bezier(fields: _Object, place: str) -> BezierContour:
+    at = _step(place, "bezier")
+    items = _list(fields["bezier"], at, "curves [[s, t], [s, t], [s, t], [s, t]]")
+    written = [_curve(item, f"{at}[{i}]") for i, item in enumerate(items)]
+    curves = _joined(written, at)
+    kinds: tuple[AnchorKind, ...] = ()
+    if "kinds" in fields:
+        named = _step(place, "kinds")
+        words = _list(fields["kinds"], named, "kinds of anchors")
+        kinds = tuple(_choice(word, f"{named}[{i}]", ANCHOR_KINDS) for i, word in enumerate(words))
+        if len(kinds) == len(written) < len(curves):
+            kinds = (*kinds, "corner")
+    return _build(at, "bezier", BezierContour, curves=curves, kinds=kinds)
+
+
+def _curve(value: Any, place: str) -> CubicCurve:
+    if not isinstance(value, list) or len(value) != 4:
+        raise _PlaceError(
+            place,
+            f"found {describe(value)}, expected 4 points [s, t]: anchor, handle, handle, anchor",
+        )
+    start, leaving, arriving, end = (
+        _vec2(item, f"{place}[{i}]", "[s, t]") for i, item in enumerate(value)
+    )
+    return start, leaving, arriving, end
+
+
+def _joined(curves: list[CubicCurve], place: str) -> tuple[CubicCurve, ...]:
+    """Close a chain of curves: ends that nearly meet do, and a last side that lacks is straight."""
+    if not curves:
+        return ()
+    axes = [[point[axis] for curve in curves for point in curve] for axis in (0, 1)]
+    near = SNAP * max(max(values) - min(values) for values in axes)
+    joined = list(curves)
+    for i, curve in enumerate(curves):
+        following = curves[(i + 1) % len(curves)][0]
+        if curve[3] == following:
+            continue
+        if math.dist(curve[3], following) <= near:
+            joined[i] = _ending_at(curve, following)
+        elif i + 1 == len(curves):
+            joined.append(_straight(curve[3], following))
+        else:
+            raise _PlaceError(
+                f"{place}[{i + 1}][0]",
+                f"found {list(following)}, expected {list(curve[3])}, "
+                "where the curve before it ends",
+            )
+    return tuple(joined)
+
+
+def _ending_at(curve: CubicCurve, end: Vec2) -> CubicCurve:
+    """Move a curve's end and shear the rest along, which keeps straight sides straight."""
+    s, t = end[0] - curve[3][0], end[1] - curve[3][1]
+    leaving, arriving = (
+        (curve[i][0] + share * s, curve[i][1] + share * t) for i, share in ((1, 1 / 3), (2, 2 / 3))
+    )
+    return curve[0], leaving, arriving, end
+
+
+def _straight(start: Vec2, end: Vec2) -> CubicCurve:
+    s, t = end[0] - start[0], end[1] - start[1]
+    leaving, arriving = ((start[0] + share * s, start[1] + share * t) for share in (1 / 3, 2 / 3))
+    return start, leaving, arriving, end
 
 
 def _display(value: Any, place: str) -> Display:
@@ -652,7 +730,7 @@ def scene_to_json(scene: Scene, base: Path | None) -> str:
                 "plane": {"origin": light.plane.origin, "u": light.plane.u, "v": light.plane.v},
                 "outline": {
                     "fill_rule": light.outline.fill_rule,
-                    "contours": [{"polygon": contour.points} for contour in light.outline.contours],
+                    "contours": [_contour_fields(item) for item in light.outline.contours],
                 },
                 "radiance": light.radiance,
                 "two_sided": light.two_sided,
@@ -663,6 +741,13 @@ def scene_to_json(scene: Scene, base: Path | None) -> str:
         "display": {"exposure": scene.display.exposure, "tone_map": scene.display.tone_map},
     }
     return _layout(document, 0) + "\n"
+
+
+def _contour_fields(contour: Contour) -> dict[str, Any]:
+    if isinstance(contour, PolygonContour):
+        return {"polygon": contour.points}
+    kinds = {"kinds": list(contour.kinds)} if contour.kinds else {}
+    return {"bezier": contour.curves, **kinds}
 
 
 def _mesh_reference(mesh: str, base: Path | None) -> str:
@@ -721,8 +806,8 @@ def _layout(value: Any, depth: int, key_length: int = 0) -> str:
     if isinstance(value, list):
         items = (_layout(item, depth + 1) for item in value)
         return "[\n" + indent + f",\n{indent}".join(items) + "\n" + indent[2:] + "]"
-    if isinstance(value, tuple):  # of points: as many on a line as fit
-        return "[\n" + _filled([_one_line(point) for point in value], indent) + "]"
+    if isinstance(value, tuple):  # of points or curves: as many on a line as fit
+        return "[\n" + _filled(value, indent, 1) + "]"
     return _one_line(value)
 
 
@@ -736,10 +821,17 @@ def _leaves(value: Any) -> Iterator[Any]:
         yield from _leaves(item)
 
 
-def _filled(words: list[str], indent: str) -> str:
-    lines, line = [], indent + words[0]
-    for word in words[1:]:
-        if len(line) + len(word) + 3 > LINE_LENGTH:
+def _filled(items: tuple[Any, ...], indent: str, closing: int) -> str:
+    """Lay out points or curves in lines, with ``closing`` brackets to follow the last."""
+    lines: list[str] = []
+    line = indent
+    for item in items:
+        word = _one_line(item)
+        if len(indent) + len(word) + closing + 1 > LINE_LENGTH and isinstance(item[0], tuple):
+            word = "[" + _filled(item, indent + " ", closing + 1).lstrip() + "]"
+        if line == indent:
+            line += word
+        elif len(line) + len(word) + closing + 3 > LINE_LENGTH:
             lines.append(line + ",")
             line = indent + word
         else:

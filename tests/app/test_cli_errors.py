@@ -243,9 +243,36 @@ CASES: dict[str, Case] = {
         "lights[0].outline.fill_rule", "did you mean 'evenodd'",
     ),
     "empty contour": bad_scene(outline({}), "lights[0].outline.contours[0]", '"polygon"'),
-    "Bézier contour": bad_scene(
-        outline({"bezier": [[[0, 0], [1, 0], [1, 1], [0, 1]]]}),
-        "lights[0].outline.contours[0].bezier", "not supported by this version",
+    "polygon and bezier": bad_scene(
+        outline({"polygon": [[0, 0], [1, 0], [1, 1]], "bezier": []}),
+        "lights[0].outline.contours[0]", "both polygon and bezier",
+    ),
+    "no curves": bad_scene(
+        outline({"bezier": []}), "lights[0].outline.contours[0].bezier", "no curves"
+    ),
+    "a curve of three points": bad_scene(
+        outline({"bezier": [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 0], [0, 0]]]}),
+        "lights[0].outline.contours[0].bezier[1]", "a list of 3", "4 points",
+    ),
+    "a handle of three numbers": bad_scene(
+        outline({"bezier": [[[0, 0], [1, 0, 0], [1, 1], [0, 1]]]}),
+        "lights[0].outline.contours[0].bezier[0][1]", "2 numbers [s, t]",
+    ),
+    "a gap between curves": bad_scene(
+        outline({"bezier": [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1.1], [0, 1], [0, 0], [0, 0]]]}),
+        "lights[0].outline.contours[0].bezier[1][0]", "found [0.0, 1.1]", "expected [0.0, 1.0]",
+    ),
+    "unknown kind of anchor": bad_scene(
+        outline({"bezier": [[[0, 0], [1, 0], [0, 1], [0, 0]]], "kinds": ["smoth"]}),
+        "lights[0].outline.contours[0].kinds[0]", "did you mean 'smooth'",
+    ),
+    "kinds for other anchors": bad_scene(
+        outline({"bezier": [[[0, 0], [1, 0], [0, 1], [0, 0]]], "kinds": ["smooth", "corner"]}),
+        "lights[0].outline.contours[0]", "2 kinds for 1 anchors",
+    ),
+    "kinds for a polygon": bad_scene(
+        outline({"polygon": [[0, 0], [1, 0], [1, 1]], "kinds": ["corner"]}),
+        "lights[0].outline.contours[0].kinds", "for a polygon",
     ),
     "texture": bad_scene(
         scene(lights=[{"texture": {"image": "a.png"}}]), "lights[0].texture", "not supported"

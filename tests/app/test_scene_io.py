@@ -6,6 +6,7 @@ import json
 import math
 import os
 import random
+import time
 from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
@@ -16,9 +17,11 @@ from hypothesis import strategies as st
 
 from app.errors import InputError
 from app.scene import (
+    ANCHOR_KINDS,
     FILL_RULES,
     TONE_MAPS,
     AreaLight,
+    BezierContour,
     Camera,
     Display,
     Material,
@@ -160,15 +163,26 @@ cameras = valid(
 transforms = valid(
     Transform, translate=triples(numbers), rotate=rotations(), scale=triples(numbers)
 )
+places = st.tuples(numbers, numbers)
+polygons = st.lists(places, min_size=3, max_size=40).map(
+    lambda points: PolygonContour(tuple(points))
+)
+
+
+@st.composite
+def chains(draw: st.DrawFn) -> BezierContour:
+    points = draw(st.lists(st.tuples(places, places, places), min_size=1, max_size=12))
+    kinds = st.lists(st.sampled_from(ANCHOR_KINDS), min_size=len(points), max_size=len(points))
+    anchors = [*points[1:], points[0]]
+    return BezierContour(
+        tuple((*curve, after[0]) for curve, after in zip(points, anchors, strict=True)),
+        tuple(draw(st.just([]) | kinds)),
+    )
+
+
 outlines = valid(
     Outline,
-    contours=st.lists(
-        st.lists(st.tuples(numbers, numbers), min_size=3, max_size=40).map(
-            lambda points: PolygonContour(tuple(points))
-        ),
-        min_size=1,
-        max_size=3,
-    ).map(tuple),
+    contours=st.lists(polygons | chains(), min_size=1, max_size=3).map(tuple),
     fill_rule=st.sampled_from(FILL_RULES),
 )
 lights = valid(
@@ -264,6 +278,106 @@ def test_written_files_are_readable() -> None:
     text = scene_to_json(scene, None)
     assert max(len(line) for line in text.splitlines()) <= LINE_LENGTH
     assert '  "camera": {"eye": [0, 1.2, 4], "target": [0, 0.8, 0], ' in text
+
+
+# Curves
+
+
+def read_contour(**fields: object) -> BezierContour:
+    (light,) = read(document(lights=[{"outline": {"contours": [fields]}}])).lights
+    (contour,) = light.outline.contours
+    assert isinstance(contour, BezierContour)
+    return contour
+
+
+def arcs(count: int) -> list[list[list[float]]]:
+    """Return a closed chain of curves about the origin as a file holds them."""
+    turn = 2.0 * math.pi / count
+    handle = 4.0 / 3.0 * math.tan(turn / 4.0)
+    circle = [(math.cos(i * turn), math.sin(i * turn)) for i in range(count)]
+    return [
+        [[x, y], [x - handle * y, y + handle * x], [z + handle * w, w - handle * z], [z, w]]
+        for (x, y), (z, w) in zip(circle, [*circle[1:], circle[0]], strict=True)
+    ]
+
+
+def test_curves_and_polygons_in_one_outline() -> None:
+    curves = arcs(4)
+    text = document(
+        lights=[
+            {
+                "outline": {
+                    "fill_rule": "nonzero",
+                    "contours": [
+                        {"polygon": SQUARE.points},
+                        {"bezier": curves, "kinds": ["smooth", "corner", "symmetric", "smooth"]},
+                    ],
+                }
+            }
+        ]
+    )
+    (light,) = read(text).lights
+    assert light.outline.contours == (
+        SQUARE,
+        BezierContour(
+            tuple(tuple(tuple(point) for point in curve) for curve in curves),
+            ("smooth", "corner", "symmetric", "smooth"),
+        ),
+    )
+    assert read(scene_to_json(read(text), None)) == read(text)
+
+
+def test_a_chain_without_its_last_side_is_closed_by_a_straight_one() -> None:
+    curves = arcs(4)[:3]
+    contour = read_contour(bezier=curves, kinds=["smooth"] * 3)
+    assert len(contour.curves) == 4
+    start, end = contour.curves[2][3], contour.curves[0][0]
+    assert contour.curves[3] == (
+        start,
+        pytest.approx((2 / 3 * start[0] + end[0] / 3, 2 / 3 * start[1] + end[1] / 3), abs=1e-15),
+        pytest.approx((start[0] / 3 + 2 / 3 * end[0], start[1] / 3 + 2 / 3 * end[1]), abs=1e-15),
+        end,
+    )
+    assert contour.kinds == ("smooth", "smooth", "smooth", "corner")
+    assert read_contour(bezier=curves, kinds=["smooth"] * 4).kinds == ("smooth",) * 4
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e12])
+def test_ends_that_nearly_meet_do(size: float) -> None:
+    generator = random.Random(3)
+    curves = [[[x * size, y * size] for x, y in curve] for curve in arcs(12)]
+    for curve in curves:
+        curve[3] = [value + generator.uniform(-5e-7, 5e-7) * size for value in curve[3]]
+    contour = read_contour(bezier=curves)
+    assert len(contour.curves) == 12
+    for curve, written in zip(contour.curves, curves, strict=True):
+        assert curve[0] == tuple(written[0])
+        for point, there in zip(curve, written, strict=True):
+            assert math.dist(point, there) < 1e-6 * size
+
+
+def test_a_straight_side_that_is_snapped_stays_straight() -> None:
+    back = [[3.0, 0.0], [2.0, 1.0], [1.0, 1.0], [0.0, 0.0]]
+    tilted = [[3.0 * k / 3, 1e-6 * k / 3] for k in range(4)]
+    curve = read_contour(bezier=[tilted, back]).curves[0]
+    for k, point in enumerate(curve):
+        assert point == pytest.approx((k, 0.0), abs=1e-15)
+
+
+def test_written_coordinates_stay_where_ends_meet() -> None:
+    curves = arcs(7)
+    contour = read_contour(bezier=curves)
+    assert [[list(point) for point in curve] for curve in contour.curves] == curves
+
+
+def test_ten_thousand_curves() -> None:
+    start = time.perf_counter()
+    scene = read(document(lights=[{"outline": {"contours": [{"bezier": arcs(10_000)}]}}]))
+    text = scene_to_json(scene, None)
+    assert read(text) == scene
+    assert max(len(line) for line in text.splitlines()) <= LINE_LENGTH
+    # About half a second on one core; this only forbids anything quadratic.
+    assert time.perf_counter() - start < 20.0
 
 
 # Mesh paths
