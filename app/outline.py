@@ -1,34 +1,17 @@
 """From an outline as drawn to loops that can be integrated, filled and picked.
 
 A scene's outline may cross itself, touch itself, repeat vertices and wind as
-it likes; ``fill_rule`` says what is inside. `resolve` turns it into simple
-loops with the interior on the left, which is all that the integrals need.
-
-The method is an arrangement by iterated snap rounding (Halperin and Packer
-2002) on a grid of 2^-44 of the extent:
-
-1. split edges where they cross, and where a vertex lies on them, until
-   nothing touches but at vertices;
-2. merge coinciding pieces and add up their directions;
-3. find the winding numbers on the two sides of every piece, and keep those
-   that separate inside from outside;
-4. link them to loops, turning into the interior at every touching point.
-
-On this grid every distance between a vertex and an edge is known to 2^-7
-steps, and nothing is closer than half a step without being joined, so float64
-decides every question; `tests/app/test_outline.py` compares areas with an
-exact scanline of rationals. Clipper 6, the usual library for this, failed that
-test for one random self-overlapping polygon in two hundred. Each axis has its
-own scale, because insideness does not change under affine maps and a needle
-along an axis then keeps its thickness. Vertices that survive unchanged are the
-caller's very float64 coordinates; only true crossings carry the grid's rounding.
+it likes; ``fill_rule`` says what is inside. `boundary` turns it into simple
+loops of cubics with the interior on the left, which is all that the integrals
+need; `resolve` into simple polygons. `app.curve_arrangement` and
+`app.polygon_arrangement` say how.
 """
 
 from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TypeVar
 
@@ -36,23 +19,27 @@ import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
-from app.scene import FillRule, Outline
+from app import curves
+from app.curve_arrangement import curve_boundary, winding_number
+from app.polygon_arrangement import (
+    Region,
+    cross,
+    frame,
+    polygon_regions,
+    ray_crossings,
+    signed_area,
+)
+from app.scene import BezierContour, Contour, Outline, PolygonContour
+
+__all__ = ["area", "boundary", "contains", "resolve", "signed_area", "triangulate"]
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Triangles = NDArray[np.int32]
 Array = TypeVar("Array", FloatArray, Triangles)
 
-GRID = 2.0**44
-"""Grid coordinates are whole numbers from -GRID to GRID."""
-
-TOUCH = 0.75
-"""Grid steps within which a vertex lies on an edge: a rounded crossing is within 0.71 of both."""
-
-MAX_ROUNDS = 50
-"""Rounds of splitting; two are usual, and what is left after so many is below the grid."""
-
-PAIRS_AT_ONCE = 1_000_000
+FLATNESS = 1e-4
+"""How far `resolve` may be from a curve, in extents of the outline: a tenth of a pixel of a
+light as high as the window."""
 
 SHRINKS = (0.0, 1e-6, 1e-4, 1e-2)
 """How far holes are drawn together for triangulation, in lengths of their edges, tried in turn."""
@@ -60,17 +47,34 @@ SHRINKS = (0.0, 1e-6, 1e-4, 1e-2)
 CACHED_VERTICES = 1_000_000
 """Of the outlines whose results are kept; beyond it the longest unused ones go."""
 
+CURVE_SIZE = 16
+"""Vertices that a curve counts for: its controls, its boundary and its lines."""
 
-@dataclass(frozen=True)
-class _Region:
-    """A connected part: an outer loop, counter-clockwise, and its holes, clockwise."""
 
-    outer: FloatArray
-    holes: tuple[FloatArray, ...]
+def boundary(outline: Outline) -> tuple[FloatArray, ...]:
+    """Return the boundary of an outline's inside as loops of cubic Bézier curves.
+
+    Parameters
+    ----------
+    outline : Outline
+        Any contours; coordinates in its plane's (s, t).
+
+    Returns
+    -------
+    tuple of (k, 4, 2) float64, read-only
+        Closed loops that do not cross, with the interior on the left: outer
+        loops counter-clockwise, holes clockwise. Each curve ends in the very
+        float64 point in which the next one begins, the last one in the first's.
+        Straight pieces have their handles at the thirds
+        (`app.curves.is_straight`). Curves of zero length are left out. Empty if
+        nothing is inside. Of contours that cross nothing the curves are the
+        caller's own, at most travelled backwards.
+    """
+    return _kept(outline).boundary
 
 
 def resolve(outline: Outline) -> tuple[FloatArray, ...]:
-    """Return the boundary of an outline's inside as simple loops.
+    """Return the boundary of an outline's inside as simple polygons.
 
     Parameters
     ----------
@@ -84,21 +88,21 @@ def resolve(outline: Outline) -> tuple[FloatArray, ...]:
         the interior on the left: outer loops counter-clockwise, each followed
         by its holes, clockwise. No repeated or collinear vertices, no loops
         without area; empty if nothing is inside.
+
+    Notes
+    -----
+    Exact for polygons. Curves are drawn as lines within `FLATNESS` of the
+    extent: for picking and for overlays, not for light.
     """
-    regions = _kept(outline).regions
-    return tuple(loop for region in regions for loop in (region.outer, *region.holes))
+    return tuple(loop for region in _kept(outline).regions for loop in region.loops)
 
 
 def area(outline: Outline) -> float:
     """Return the area inside an outline in its plane's units, never negative."""
-    return float(sum(signed_area(loop) for loop in resolve(outline)))
-
-
-def signed_area(loop: FloatArray) -> float:
-    """Return the area of a closed loop (k, 2), positive if counter-clockwise."""
-    local = loop - loop[0]
-    following = np.roll(local, -1, axis=0)
-    return 0.5 * float(np.sum(local[:, 0] * following[:, 1] - local[:, 1] * following[:, 0]))
+    if not _has_curves(outline):
+        return float(sum(signed_area(loop) for loop in resolve(outline)))
+    # About a point of the loop, lest a far place costs digits.
+    return float(sum(np.sum(curves.signed_areas(loop - loop[0, 0])) for loop in boundary(outline)))
 
 
 def triangulate(outline: Outline) -> tuple[FloatArray, Triangles]:
@@ -115,20 +119,27 @@ def triangulate(outline: Outline) -> tuple[FloatArray, Triangles]:
     -----
     Ear clipping, for drawing only: of a thousand random polygons that overlap
     and touch themselves it missed a sliver or covered one twice in fewer than
-    one. `resolve`, which the light is computed from, has no such exceptions.
+    one. `boundary`, which the light is computed from, has no such exceptions.
     """
-    kept = _kept(outline)
-    if kept.triangulation is None:
-        kept.triangulation = _triangulated(kept.regions)
-    return kept.triangulation
+    return _kept(outline).triangulation
 
 
-def _triangulated(regions: tuple[_Region, ...]) -> tuple[FloatArray, Triangles]:
+def contains(outline: Outline, point: tuple[float, float]) -> bool:
+    """Return whether a point (s, t) is inside an outline; on the boundary, either."""
+    place = np.array(point, dtype=np.float64)
+    if not _has_curves(outline):
+        return sum(ray_crossings(loop, place) for loop in resolve(outline)) % 2 == 1
+    chains = [_as_chain(contour) for contour in outline.contours]
+    winding = winding_number(np.concatenate(chains), place)
+    return winding % 2 != 0 if outline.fill_rule == "evenodd" else winding != 0
+
+
+def _triangulated(regions: tuple[Region, ...]) -> tuple[FloatArray, Triangles]:
     points: list[FloatArray] = []
     triangles: list[Triangles] = []
     start = 0
     for region in regions:
-        loops = (region.outer, *region.holes)
+        loops = region.loops
         vertices = np.concatenate(loops)
         ends = np.cumsum([len(loop) for loop in loops]).astype(np.uint32)
         low, high = vertices.min(axis=0), vertices.max(axis=0)
@@ -140,12 +151,6 @@ def _triangulated(regions: tuple[_Region, ...]) -> tuple[FloatArray, Triangles]:
     if not points:
         return _frozen(np.zeros((0, 2))), _frozen(np.zeros((0, 3), np.int32))
     return _frozen(np.concatenate(points)), _frozen(np.concatenate(triangles).astype(np.int32))
-
-
-def contains(outline: Outline, point: tuple[float, float]) -> bool:
-    """Return whether a point (s, t) is inside an outline; on the boundary, either."""
-    place = np.array(point, dtype=np.float64)
-    return sum(_ray_crossings(loop, place) for loop in resolve(outline)) % 2 == 1
 
 
 def _covering_triangles(vertices: FloatArray, ends: NDArray[np.uint32]) -> Triangles:
@@ -164,7 +169,7 @@ def _covering_triangles(vertices: FloatArray, ends: NDArray[np.uint32]) -> Trian
             moved[first:end] += apart * _into_the_hole(vertices[first:end])
         triangles = mapbox_earcut.triangulate_float64(moved, ends).astype(np.int32).reshape(-1, 3)
         a, b, c = (vertices[triangles[:, i]] for i in range(3))
-        doubled = _cross(b - a, c - a)
+        doubled = cross(b - a, c - a)
         triangles[doubled < 0.0] = triangles[doubled < 0.0][:, ::-1]
         wrong = abs(0.5 * float(np.sum(np.abs(doubled))) - wanted)
         if wrong < least:
@@ -184,21 +189,65 @@ def _into_the_hole(loop: FloatArray) -> FloatArray:
     return np.asarray(np.minimum(*lengths)[:, None] * right)
 
 
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
 def _frozen(array: Array) -> Array:
     array.setflags(write=False)
     return array
 
 
-@dataclass
-class _Kept:
-    """What is known of an outline; triangles only once they were asked for."""
+def _has_curves(outline: Outline) -> bool:
+    return any(isinstance(contour, BezierContour) for contour in outline.contours)
 
-    regions: tuple[_Region, ...]
-    triangulation: tuple[FloatArray, Triangles] | None = None
+
+def _as_points(contour: PolygonContour) -> FloatArray:
+    return np.asarray(contour.points, dtype=np.float64)
+
+
+def _as_chain(contour: Contour) -> FloatArray:
+    """Return a contour as a closed chain of cubics (k, 4, 2)."""
+    if isinstance(contour, BezierContour):
+        return np.asarray(contour.curves, dtype=np.float64)
+    points = _as_points(contour)
+    return curves.line_as_cubic(points, np.roll(points, -1, axis=0))
+
+
+class _Kept:
+    """What is known of an outline, each part computed when it was first asked for."""
+
+    def __init__(self, outline: Outline) -> None:
+        self._outline = outline
+
+    @cached_property
+    def boundary(self) -> tuple[FloatArray, ...]:
+        if _has_curves(self._outline):
+            chains = [_as_chain(contour) for contour in self._outline.contours]
+            loops = curve_boundary(chains, self._outline.fill_rule)
+        else:
+            corners = (loop for region in self.regions for loop in region.loops)
+            loops = [curves.line_as_cubic(loop, np.roll(loop, -1, axis=0)) for loop in corners]
+        return tuple(_frozen(loop) for loop in loops)
+
+    @cached_property
+    def regions(self) -> tuple[Region, ...]:
+        polygons = [
+            _as_points(contour)
+            for contour in self._outline.contours
+            if isinstance(contour, PolygonContour)
+        ]
+        if len(polygons) == len(self._outline.contours):
+            return polygon_regions(polygons, self._outline.fill_rule)
+        if not self.boundary:
+            return ()
+        extent = frame(np.concatenate(self.boundary).reshape(-1, 2))
+        if extent is None:
+            return ()
+        tolerance = FLATNESS * 2.0 * float(np.max(extent[1]))
+        lines = [curves.flatten(loop, tolerance) for loop in self.boundary]
+        # Lines of curves that nearly touch may cross, so they are resolved in their turn.
+        return polygon_regions(lines, "nonzero")
+
+    @cached_property
+    def triangulation(self) -> tuple[FloatArray, Triangles]:
+        return _triangulated(self.regions)
 
 
 class _Cache:
@@ -209,10 +258,10 @@ class _Cache:
         self._vertices = 0
 
     def __call__(self, outline: Outline) -> _Kept:
-        """Look an outline up, or resolve it."""
+        """Look an outline up, or begin to resolve it."""
         kept = self._kept.get(outline)
         if kept is None:
-            kept = self._kept[outline] = _Kept(_regions(outline))
+            kept = self._kept[outline] = _Kept(outline)
             self._vertices += _size(outline)
             while self._vertices > CACHED_VERTICES and len(self._kept) > 1:
                 oldest, _ = self._kept.popitem(last=False)
@@ -225,344 +274,9 @@ _kept = _Cache()
 
 
 def _size(outline: Outline) -> int:
-    return sum(len(contour.points) for contour in outline.contours)
-
-
-def _regions(outline: Outline) -> tuple[_Region, ...]:
-    contours = [np.asarray(contour.points, dtype=np.float64) for contour in outline.contours]
-    everything = np.concatenate(contours)
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    centre = 0.5 * low + 0.5 * high
-    half = np.maximum(high - centre, centre - low)
-    # Below the normal range the division would lose all digits; such an extent is nothing.
-    if not np.all(half > np.finfo(np.float64).tiny * 2.0**60):
-        return ()
-    grids = [np.rint((contour - centre) / half * GRID) for contour in contours]
-    exact: dict[tuple[float, float], FloatArray] = {}
-    for grid, contour in zip(grids, contours, strict=True):
-        for key, vertex in zip(map(tuple, grid.tolist()), contour, strict=True):
-            exact.setdefault(key, vertex)
-
-    def in_plane(loop: FloatArray) -> FloatArray:
-        vertices = loop / GRID * half + centre
-        for i, key in enumerate(map(tuple, loop.tolist())):
-            if key in exact:
-                vertices[i] = exact[key]
-        result: FloatArray = _frozen(vertices)
-        return result
-
-    loops = _boundary_loops(_arranged(grids), outline.fill_rule)
-    loops = [_without_collinear(loop) for loop in loops]
-    loops = [loop for loop in loops if len(loop) >= 3 and _is_wider_than_grid(loop)]
-    outers = [loop for loop in loops if signed_area(loop) > 0.0]
-    holes = [loop for loop in loops if signed_area(loop) < 0.0]
-    owner = [_owner(hole, outers) for hole in holes]
-    return tuple(
-        _Region(
-            in_plane(outer),
-            tuple(in_plane(hole) for hole, own in zip(holes, owner, strict=True) if own == index),
-        )
-        for index, outer in enumerate(outers)
+    return sum(
+        len(contour.points)
+        if isinstance(contour, PolygonContour)
+        else CURVE_SIZE * len(contour.curves)
+        for contour in outline.contours
     )
-
-
-# The arrangement, on the grid
-
-
-@dataclass(frozen=True)
-class _Pieces:
-    """Edges that meet only at vertices, merged where they coincide.
-
-    ``count`` is how often the piece from ``start`` to ``end`` was drawn in
-    this direction, more than in the other; always positive.
-    """
-
-    vertices: FloatArray
-    start: IntArray
-    end: IntArray
-    count: IntArray
-
-
-def _arranged(contours: list[FloatArray]) -> _Pieces:
-    vertices = np.concatenate(contours)
-    start = np.arange(len(vertices))
-    ends, first = [], 0
-    for contour in contours:
-        ends.append(first + np.roll(np.arange(len(contour)), -1))
-        first += len(contour)
-    end = np.concatenate(ends)
-    pieces = _merged(vertices, start, end, np.ones(len(start), dtype=np.int64))
-    for _ in range(MAX_ROUNDS):
-        split = _split_once(pieces)
-        if split is None:
-            break
-        pieces = split
-    return pieces
-
-
-def _merged(vertices: FloatArray, start: IntArray, end: IntArray, count: IntArray) -> _Pieces:
-    """Number equal vertices alike, add up coinciding pieces, and drop what cancels."""
-    vertices, number = np.unique(vertices, axis=0, return_inverse=True)
-    number = number.reshape(-1)
-    start, end = number[start], number[end]
-    backward = start > end
-    low, high = np.where(backward, end, start), np.where(backward, start, end)
-    edges, which = np.unique(np.stack((low, high), axis=1), axis=0, return_inverse=True)
-    total = np.zeros(len(edges), dtype=np.int64)
-    np.add.at(total, which.reshape(-1), np.where(backward, -count, count))
-    keep = (total != 0) & (edges[:, 0] != edges[:, 1])
-    edges, total = edges[keep], total[keep]
-    swap = total < 0
-    return _Pieces(
-        vertices,
-        np.where(swap, edges[:, 1], edges[:, 0]),
-        np.where(swap, edges[:, 0], edges[:, 1]),
-        np.abs(total),
-    )
-
-
-def _split_once(pieces: _Pieces) -> _Pieces | None:
-    """Split pieces where others touch or cross them; None if there is nothing to split."""
-    vertices, start, end = pieces.vertices, pieces.start, pieces.end
-    one, two = _overlapping_boxes(vertices[start], vertices[end])
-    piece, cut = [], []  # which piece is split at which vertex
-    crossing = np.ones(len(one), dtype=bool)
-    sides = []
-    for first, second in ((one, two), (two, one)):
-        a, b = vertices[start[first]], vertices[end[first]]
-        length = np.hypot(*(b - a).T)
-        pair = []
-        for tip in (start[second], end[second]):
-            c = vertices[tip]
-            distance = _cross(b - a, c - a) / length
-            along = np.sum((b - a) * (c - a), axis=1) / length
-            touches = (np.abs(distance) <= TOUCH) & (along > 0.0) & (along < length)
-            touches &= (tip != start[first]) & (tip != end[first])
-            piece.append(first[touches])
-            cut.append(tip[touches])
-            near = np.abs(distance) <= TOUCH
-            crossing &= ~near
-            pair.append(distance)
-        crossing &= (pair[0] > 0.0) != (pair[1] > 0.0)
-        sides.append(pair)
-    one, two = one[crossing], two[crossing]
-    # Where piece two meets the line of piece one: distances divide it.
-    near, far = (distance[crossing] for distance in sides[0])
-    c, d = vertices[start[two]], vertices[end[two]]
-    points = np.rint(c + (near / (near - far))[:, None] * (d - c))
-    new = len(vertices) + np.arange(len(points))
-    piece += [one, two]
-    cut += [new, new]
-    splits = np.concatenate(piece)
-    if not len(splits):
-        return None
-    vertices = np.concatenate((vertices, points))
-
-    # Each piece becomes the sequence of its start, its cuts by distance, and its end.
-    cuts = np.concatenate(cut)
-    all_pieces = np.arange(len(start))
-    owner = np.concatenate((all_pieces, splits, all_pieces))
-    stop = np.concatenate((start, cuts, end))
-    rank = np.repeat([0, 1, 2], [len(start), len(splits), len(start)])
-    direction = vertices[end[owner]] - vertices[start[owner]]
-    along = np.sum((vertices[stop] - vertices[start[owner]]) * direction, axis=1)
-    order = np.lexsort((along, rank, owner))
-    owner, stop = owner[order], stop[order]
-    inner = owner[:-1] == owner[1:]
-    return _merged(vertices, stop[:-1][inner], stop[1:][inner], pieces.count[owner[:-1][inner]])
-
-
-def _overlapping_boxes(a: FloatArray, b: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return all pairs of segments whose bounding boxes, a little enlarged, overlap."""
-    low, high = np.minimum(a, b) - 1.0, np.maximum(a, b) + 1.0
-    order = np.argsort(low[:, 0], kind="stable")
-    low, high = low[order], high[order]
-    # In order of their left ends, a segment meets those that begin before its right end.
-    stop = np.searchsorted(low[:, 0], high[:, 0], side="right")
-    ones, twos = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    first = 0
-    while first < len(order):
-        # As many rows at once as keep the pairs in the processor's cache.
-        reach = np.cumsum(stop[first:] - np.arange(first, len(order)) - 1)
-        rows = max(1, int(np.searchsorted(reach, PAIRS_AT_ONCE, side="right")))
-        one = np.arange(first, first + rows)
-        width = stop[one] - one - 1
-        one = np.repeat(one, width)
-        begin = np.repeat(np.cumsum(width) - width, width)
-        two = one + 1 + np.arange(len(one)) - begin
-        meets = (low[one, 1] <= high[two, 1]) & (low[two, 1] <= high[one, 1])
-        ones.append(order[one[meets]])
-        twos.append(order[two[meets]])
-        first += rows
-    return np.concatenate(ones), np.concatenate(twos)
-
-
-def _boundary_loops(pieces: _Pieces, fill_rule: FillRule) -> list[FloatArray]:
-    """Return the loops between inside and outside, the inside on their left."""
-    if not len(pieces.start):
-        return []
-    right = _winding_on_the_right(pieces)
-    left = right + pieces.count
-    inside_left, inside_right = (
-        (winding % 2 != 0) if fill_rule == "evenodd" else (winding != 0)
-        for winding in (left, right)
-    )
-    separates = inside_left != inside_right
-    flip = inside_right[separates]
-    start, end = pieces.start[separates], pieces.end[separates]
-    start, end = np.where(flip, end, start), np.where(flip, start, end)
-    return [pieces.vertices[loop] for loop in _linked(pieces.vertices, start, end)]
-
-
-def _winding_on_the_right(pieces: _Pieces) -> IntArray:
-    """Return the winding number just right of every piece.
-
-    Around a vertex, what is left of one outgoing piece is right of the next:
-    a walk over these neighbours carries the number through a connected part
-    of the arrangement, and one ray per part sets it.
-    """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
-
-    total = len(pieces.start)
-    a, b = pieces.vertices[pieces.start], pieces.vertices[pieces.end]
-    # Half-edges leave a vertex: those of starts first, then those of ends, backwards.
-    origin = np.concatenate((pieces.start, pieces.end))
-    direction = np.concatenate((b - a, a - b))
-    order = np.lexsort((np.arctan2(direction[:, 1], direction[:, 0]), origin))
-    ordered = origin[order]
-    begins = np.concatenate(([True], ordered[1:] != ordered[:-1]))
-    ends = np.roll(begins, -1)
-    following = np.roll(order, -1)
-    following[ends] = order[begins]
-    piece, neighbour = order % total, following % total
-    # Left of a half-edge, and right of the next, relative to the right of their pieces.
-    step = np.where(order < total, pieces.count[piece], 0)
-    step -= np.where(following < total, 0, pieces.count[neighbour])
-    offset = {}
-    for one, two, change in zip(piece.tolist(), neighbour.tolist(), step.tolist(), strict=True):
-        offset[one, two] = change
-        offset[two, one] = -change
-    links = coo_matrix((np.ones(len(piece)), (piece, neighbour)), shape=(total, total)).tocsr()
-    parts, part = connected_components(links, directed=False)
-    # Of each part the longest piece: sorted by length, the last one wins.
-    longest = np.zeros(parts, dtype=np.int64)
-    by_length = np.argsort(np.hypot(*(b - a).T), kind="stable")
-    longest[part[by_length]] = by_length
-    winding = np.zeros(total, dtype=np.int64)
-    for root in longest.tolist():
-        winding[root] = _winding_by_ray(a, b, pieces.count, root)
-        visited, before = breadth_first_order(links, root, directed=False)
-        for index in visited[1:].tolist():
-            came_from = int(before[index])
-            winding[index] = winding[came_from] + offset[came_from, index]
-    return winding
-
-
-def _winding_by_ray(a: FloatArray, b: FloatArray, count: IntArray, piece: int) -> int:
-    """Return the winding number just right of one piece, by a ray from its middle."""
-    origin = 0.5 * (a[piece] + b[piece])
-    step = b[piece] - a[piece]
-    if abs(step[0]) > abs(step[1]):
-        # A flat piece sends its ray up: the plane turned by -90 degrees, the ray along +x.
-        a, b = (np.stack((ends[:, 1], -ends[:, 0]), axis=1) for ends in (a, b))
-        origin, step = (np.array((pair[1], -pair[0])) for pair in (origin, step))
-    upward = (a[:, 1] <= origin[1]) & (b[:, 1] > origin[1])
-    downward = (b[:, 1] <= origin[1]) & (a[:, 1] > origin[1])
-    upward[piece] = downward[piece] = False
-    spans = np.flatnonzero(upward | downward)
-    beyond = (_cross(b[spans] - a[spans], origin - a[spans]) > 0.0) == upward[spans]
-    met = spans[beyond]
-    ahead = int(np.sum(np.where(upward[met], count[met], -count[met])))
-    # The ray leaves an upward piece on its right, a downward one on its left.
-    return ahead if step[1] > 0.0 else ahead - int(count[piece])
-
-
-def _linked(vertices: FloatArray, start: IntArray, end: IntArray) -> list[list[int]]:
-    """Link directed edges, interior on their left, to loops without repeated vertices."""
-    leaving: dict[int, list[int]] = {}
-    for edge, vertex in enumerate(start.tolist()):
-        leaving.setdefault(vertex, []).append(edge)
-    ends = end.tolist()
-
-    def next_edge(came_from: int, at: int) -> int | None:
-        """Take the edge that bounds the same interior: the first one clockwise from behind."""
-        choices = leaving.get(at, [])
-        if not choices:
-            return None
-        chosen = 0
-        if len(choices) > 1:
-            back = vertices[came_from] - vertices[at]
-            turns = []
-            for edge in choices:
-                ahead = vertices[ends[edge]] - vertices[at]
-                angle = math.atan2(
-                    back[0] * ahead[1] - back[1] * ahead[0], back[0] * ahead[0] + back[1] * ahead[1]
-                )
-                turns.append(-angle if angle < 0.0 else math.tau - angle)
-            chosen = turns.index(min(turns))
-        return choices.pop(chosen)
-
-    loops: list[list[int]] = []
-    for first in list(leaving):
-        while leaving[first]:
-            path, place = [first], {first: 0}
-            taken: int | None = leaving[first].pop()
-            while taken is not None:
-                vertex = ends[taken]
-                if vertex in place:
-                    begin = place[vertex]
-                    loop = path[begin:]
-                    loops.append(loop)
-                    del path[begin + 1 :]
-                    for passed in loop[1:]:
-                        del place[passed]
-                    taken = next_edge(loop[-1], vertex)
-                else:
-                    place[vertex] = len(path)
-                    path.append(vertex)
-                    taken = next_edge(path[-2], vertex)
-    return loops
-
-
-def _owner(hole: FloatArray, outers: list[FloatArray]) -> int:
-    """Return which outer loop a hole is in: the smallest one around it, or -1."""
-    # The middle of an edge, because a vertex may touch the outer loop.
-    edges = np.roll(hole, -1, axis=0) - hole
-    longest = int(np.argmax(np.hypot(*edges.T)))
-    point = hole[longest] + 0.5 * edges[longest]
-    around = [index for index, outer in enumerate(outers) if _ray_crossings(outer, point) % 2 == 1]
-    return min(around, key=lambda index: signed_area(outers[index]), default=-1)
-
-
-def _ray_crossings(loop: FloatArray, point: FloatArray) -> int:
-    """Count the edges of a loop that a ray from ``point`` along +x meets."""
-    a, b = loop, np.roll(loop, -1, axis=0)
-    spans = (a[:, 1] <= point[1]) != (b[:, 1] <= point[1])
-    a, b = a[spans], b[spans]
-    is_left_of = _cross(b - a, point - a) > 0.0
-    return int(np.count_nonzero(is_left_of == (b[:, 1] > a[:, 1])))
-
-
-def _without_collinear(loop: FloatArray) -> FloatArray:
-    """Drop vertices within a grid step of the line through their neighbours, spikes included."""
-    while len(loop) >= 3:
-        before, after = np.roll(loop, 1, axis=0), np.roll(loop, -1, axis=0)
-        chord = after - before
-        length = np.hypot(*chord.T)
-        drop = np.abs(_cross(chord, loop - before)) <= length
-        # Not two neighbours in one round: the second may turn once the first is gone.
-        candidates = np.flatnonzero(drop)
-        if not len(candidates):
-            break
-        chosen = np.zeros(len(loop), dtype=bool)
-        for i in candidates:
-            chosen[i] = not chosen[i - 1] and not chosen[(i + 1) % len(loop)]
-        loop = loop[~chosen]
-    return loop
-
-
-def _is_wider_than_grid(loop: FloatArray) -> bool:
-    """Tell a loop with area from a sliver that rounding left: wider than two grid steps."""
-    perimeter = float(np.sum(np.hypot(*(np.roll(loop, -1, axis=0) - loop).T)))
-    return abs(signed_area(loop)) > perimeter

@@ -15,7 +15,8 @@ ROOT = Path(__file__).resolve().parents[2]
 GL = {"moderngl", "moderngl_window", "glcontext", "OpenGL"}
 GUI = {"imgui_bundle", "glfw", "implot", "imguizmo"}
 PURE = {
-    "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.errors", "app.files",
+    "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.curves", "app.curve_arrangement",
+    "app.polygon_arrangement", "app.presets", "app.errors", "app.files",
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
     "app.lights", "app.planes", "app.step_names", "app.gui.messages", "app.gui.shortcuts",
     "app.gui.beginning", "app.gui.documents",
