@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from app import edits, lights, step_names
+from app import contours, edits, lights, step_names
 from app.scene import AreaLight, Camera, Scene, SceneObject
 
 Kind: TypeAlias = Literal["none", "light", "object"]
@@ -44,8 +44,8 @@ class Selection:
                 return NOTHING
             if self.vertex is not None:
                 contour, point = self.vertex
-                contours = scene.lights[self.index].outline.contours
-                if contour >= len(contours) or point >= len(contours[contour].points):
+                own = scene.lights[self.index].outline.contours
+                if contour >= len(own) or point >= contours.size_of(own[contour]):
                     return replace(self, vertex=None)
         return self
 

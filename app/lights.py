@@ -1,20 +1,34 @@
 """What one light is and what can be done to it: pure functions to a number or a new light.
 
-Vertices are named by (contour, point). An edit that is not possible raises
-`SceneError` with a sentence for the user.
+Vertices, a polygon's corners and a curve's anchors, are named by (contour,
+point), segments by (contour, segment); `app.contours` says what can be done to
+them. What changes the outline itself forgets what it was made from (`source`).
+An edit that is not possible raises `SceneError` with a sentence for the user.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app import contours, presets
 from app.planes import metric_from_plane, normal_of, point_on
-from app.scene import AreaLight, Plane, PolygonContour, SceneError, Vec2, Vec3
+from app.scene import (
+    AnchorKind,
+    AreaLight,
+    BezierContour,
+    Contour,
+    Plane,
+    PolygonContour,
+    SceneError,
+    Vec2,
+    Vec3,
+)
 from app.vectors import (
     add,
     cross,
@@ -29,21 +43,36 @@ from app.vectors import (
 )
 
 FloatArray = NDArray[np.float64]
+Vertex: TypeAlias = tuple[int, int]
+Hole: TypeAlias = Literal["square", "round"]
+
+FINE = 1e-3
+"""How far `widest_place` and `bounds_of` may miss a curve, in sizes of the outline."""
 
 
-def vertices_of(light: AreaLight) -> list[tuple[tuple[int, int], Vec2]]:
+def vertices_of(light: AreaLight) -> list[tuple[Vertex, Vec2]]:
     """Return ((contour, point), (s, t)) for every vertex of the light."""
     return [
         ((c, p), point)
         for c, contour in enumerate(light.outline.contours)
-        for p, point in enumerate(contour.points)
+        for p, point in enumerate(contours.points_of(contour))
     ]
+
+
+def is_curved(light: AreaLight) -> bool:
+    """Tell whether the light has a contour of curves, be they straight."""
+    return any(isinstance(contour, BezierContour) for contour in light.outline.contours)
+
+
+def word_for_vertex(contour: Contour) -> str:
+    """Return what people call a vertex of the contour: a corner, or an anchor of curves."""
+    return "corner" if isinstance(contour, PolygonContour) else "anchor"
 
 
 def extent_of(light: AreaLight) -> tuple[Vec2, Vec2]:
     """Return the lower and upper corner of the outline's bounding box, in (s, t)."""
-    points = np.concatenate([np.array(contour.points) for contour in light.outline.contours])
-    (s0, t0), (s1, t1) = points.min(0).tolist(), points.max(0).tolist()
+    boxes = np.array([contours.bounds(contour) for contour in light.outline.contours])
+    (s0, t0), (s1, t1) = boxes[:, 0].min(0).tolist(), boxes[:, 1].max(0).tolist()
     return (s0, t0), (s1, t1)
 
 
@@ -54,68 +83,137 @@ def centre_of(light: AreaLight) -> Vec3:
 
 def bounds_of(light: AreaLight) -> tuple[Vec3, float]:
     """Return centre and radius [m] of a sphere around the light, about `centre_of`."""
-    middle = np.array(mix(*extent_of(light), 0.5))
-    points = np.concatenate([np.array(contour.points) for contour in light.outline.contours])
-    away = (points - middle) @ np.array([light.plane.u, light.plane.v])
-    return centre_of(light), float(np.linalg.norm(away, axis=-1).max())
+    middle = np.array(mix(*extent_of(light), 0.5)) @ metric_from_plane(light.plane).T
+    loops, tolerance = _loops(light)
+    away = np.concatenate(loops) - middle
+    return centre_of(light), float(np.linalg.norm(away, axis=-1).max()) + tolerance
 
 
-def _with_contour(light: AreaLight, contour: int, points: Iterable[Vec2]) -> AreaLight:
-    contours = list(light.outline.contours)
-    contours[contour] = PolygonContour(tuple(points))
-    return replace(light, outline=replace(light.outline, contours=tuple(contours)))
+def _loops(light: AreaLight) -> tuple[list[FloatArray], float]:
+    """Return the contours as polygons (n, 2) [m] and how far they may miss curves [m]."""
+    metric = metric_from_plane(light.plane)
+    if not is_curved(light):
+        polygons = [np.array(contours.points_of(c)) @ metric.T for c in light.outline.contours]
+        return polygons, 0.0
+    (s0, t0), (s1, t1) = extent_of(light)
+    size = float(np.abs(metric @ np.diag((s1 - s0, t1 - t0))).sum())
+    tolerance = FINE * max(size, 1e-30)
+    return [
+        contours.flatten(contour, tolerance, metric) @ metric.T
+        for contour in light.outline.contours
+    ], tolerance
 
 
-def move_vertex(light: AreaLight, vertex: tuple[int, int], to: Vec2) -> AreaLight:
-    """Put one vertex at plane coordinates ``to``."""
+def _with_contours(light: AreaLight, changed: Iterable[Contour]) -> AreaLight:
+    return replace(light, outline=replace(light.outline, contours=tuple(changed)), source=None)
+
+
+def _with_contour(light: AreaLight, contour: int, *by: Contour) -> AreaLight:
+    """Return the light with others in the place of a contour, itself if it is the same one."""
+    own = light.outline.contours
+    if by == (own[contour],):
+        return light
+    return _with_contours(light, (*own[:contour], *by, *own[contour + 1 :]))
+
+
+# Vertices, handles and segments
+
+
+def move_vertex(light: AreaLight, vertex: Vertex, to: Vec2) -> AreaLight:
+    """Put one vertex at plane coordinates ``to``; handles move along."""
     contour, point = vertex
-    points = list(light.outline.contours[contour].points)
-    points[point] = (float(to[0]), float(to[1]))
-    return _with_contour(light, contour, points)
+    old = light.outline.contours[contour]
+    metric = metric_from_plane(light.plane)
+    return _with_contour(light, contour, contours.move_point(old, point, to, metric))
+
+
+def move_handle(
+    light: AreaLight, contour: int, segment: int, which: int, to: Vec2, *, free: bool = False
+) -> AreaLight:
+    """Put a handle at plane coordinates ``to``, see `contours.move_handle`."""
+    old = _bezier(light, contour)
+    metric = metric_from_plane(light.plane)
+    moved = contours.move_handle(old, segment, which, to, free=free, metric=metric)
+    return _with_contour(light, contour, moved)
+
+
+def retract_handle(light: AreaLight, contour: int, segment: int, which: int) -> AreaLight:
+    """Lay a handle on its anchor."""
+    old = _bezier(light, contour)
+    return _with_contour(light, contour, contours.retract_handle(old, segment, which))
+
+
+def _bezier(light: AreaLight, contour: int) -> BezierContour:
+    found = light.outline.contours[contour]
+    if isinstance(found, BezierContour):
+        return found
+    raise SceneError(f"light '{light.name}': contour {contour} is a polygon and has no handles")
+
+
+def set_kind(light: AreaLight, vertex: Vertex, kind: AnchorKind) -> AreaLight:
+    """Make a vertex a corner, smooth or symmetric; a polygon becomes curves unless a corner."""
+    contour, point = vertex
+    old = light.outline.contours[contour]
+    if isinstance(old, PolygonContour) and kind == "corner":
+        return light
+    metric = metric_from_plane(light.plane)
+    return _with_contour(light, contour, contours.set_kind(old, point, kind, metric))
 
 
 def nearest_edge(light: AreaLight, at: Vec2) -> tuple[int, int, float]:
-    """Return (contour, edge, position along it in [0, 1]) of the boundary point nearest to ``at``.
+    """Return (contour, segment, parameter along it) of the boundary point nearest to ``at``.
 
-    Edge i leads from point i to the next. Distances are metres on the plane,
+    Segment i leads from point i to the next. Distances are metres on the plane,
     so a skew plane is no obstacle.
     """
     metric = metric_from_plane(light.plane)
-    target = metric @ np.asarray(at)
-    best = (math.inf, (0, 0, 0.0))
-    for c, contour in enumerate(light.outline.contours):
-        points = np.asarray(contour.points) @ metric.T
-        ways = np.roll(points, -1, axis=0) - points
-        squares = (ways**2).sum(-1)
-        along = ((target - points) * ways).sum(-1) / np.where(squares > 0.0, squares, 1.0)
-        along = np.clip(along, 0.0, 1.0)
-        distances = np.linalg.norm(points + along[:, None] * ways - target, axis=-1)
-        edge = int(distances.argmin())
-        best = min(best, (float(distances[edge]), (c, edge, float(along[edge]))))
-    return best[1]
+    found = [contours.nearest(contour, at, metric) for contour in light.outline.contours]
+    best = min(range(len(found)), key=lambda index: found[index][0])
+    return best, found[best][1], found[best][2]
 
 
-def add_vertex(light: AreaLight, contour: int, edge: int, along: float = 0.5) -> AreaLight:
-    """Split an edge at the fraction ``along`` of its way; the new point has index edge + 1."""
-    points = list(light.outline.contours[contour].points)
-    new = mix(points[edge], points[(edge + 1) % len(points)], along)
-    points.insert(edge + 1, new)
-    return _with_contour(light, contour, points)
+def point_along(light: AreaLight, contour: int, segment: int, along: float) -> Vec2:
+    """Return the plane coordinates of a place on a segment."""
+    return contours.point_at(light.outline.contours[contour], segment, along)
 
 
-def remove_vertex(light: AreaLight, vertex: tuple[int, int]) -> AreaLight:
-    """Remove one vertex. A triangle is removed whole if other contours remain.
+def add_vertex(light: AreaLight, contour: int, segment: int, along: float = 0.5) -> AreaLight:
+    """Split a segment at the parameter ``along``, the shape unchanged.
+
+    The new point has index segment + 1.
+    """
+    old = light.outline.contours[contour]
+    return _with_contour(light, contour, contours.insert(old, segment, along))
+
+
+def remove_vertex(light: AreaLight, vertex: Vertex) -> AreaLight:
+    """Remove one vertex. A contour without an inside is removed whole if others remain.
 
     Raises
     ------
     SceneError
-        If it is the light's last triangle.
+        If it is the light's last contour, and has no vertex to spare.
     """
     contour, point = vertex
-    points = light.outline.contours[contour].points
-    if len(points) > 3:
-        return _with_contour(light, contour, points[:point] + points[point + 1 :])
+    rest = contours.remove(light.outline.contours[contour], point)
+    if rest is not None:
+        return _with_contour(light, contour, rest)
     return remove_contour(light, contour)
+
+
+def straighten(light: AreaLight, contour: int, segment: int) -> AreaLight:
+    """Make a segment a straight line."""
+    old = light.outline.contours[contour]
+    return _with_contour(light, contour, contours.straighten(old, segment))
+
+
+def bend(light: AreaLight, contour: int, segment: int) -> AreaLight:
+    """Give a straight segment handles; a polygon becomes curves. The shape stays."""
+    old = light.outline.contours[contour]
+    return _with_contour(light, contour, contours.bend(old, segment))
+
+
+# Contours
 
 
 def remove_contour(light: AreaLight, contour: int) -> AreaLight:
@@ -126,23 +224,72 @@ def remove_contour(light: AreaLight, contour: int) -> AreaLight:
     SceneError
         If it is the only one.
     """
-    contours = light.outline.contours
-    if len(contours) == 1:
+    own = light.outline.contours
+    if len(own) == 1:
+        count, word = contours.size_of(own[0]), word_for_vertex(own[0])
+        fewest = 3 if isinstance(own[0], PolygonContour) else 2
         raise SceneError(
-            f"light '{light.name}' has only this outline of {len(contours[0].points)} corners; "
-            "3 is the fewest a light can have"
+            f"light '{light.name}' has only this outline of {count} {word}s; "
+            f"{fewest} is the fewest a light can have"
         )
-    rest = contours[:contour] + contours[contour + 1 :]
-    return replace(light, outline=replace(light.outline, contours=rest))
+    return _with_contours(light, own[:contour] + own[contour + 1 :])
+
+
+def reverse_contour(light: AreaLight, contour: int) -> AreaLight:
+    """Let a contour wind the other way, which matters under the nonzero rule."""
+    return _with_contour(light, contour, contours.reverse(light.outline.contours[contour]))
+
+
+def split_contour(light: AreaLight, contour: int, first: int, second: int) -> AreaLight:
+    """Cut a contour in two along the line between two of its points.
+
+    The second part comes right after the first.
+
+    Raises
+    ------
+    SceneError
+        If a part would have no inside.
+    """
+    parts = contours.split(light.outline.contours[contour], first, second)
+    return _with_contour(light, contour, *parts)
+
+
+def to_bezier(light: AreaLight, contour: int | None = None) -> AreaLight:
+    """Make curves of a polygon, or of all, the shape unchanged."""
+    return _with_each(light, contour, contours.to_bezier)
+
+
+def to_polygon(light: AreaLight, fineness: float, contour: int | None = None) -> AreaLight:
+    """Make a polygon of curves, or of all, within ``fineness`` times the light's size."""
+    metric = metric_from_plane(light.plane)
+    tolerance = fineness * size_of(light)
+    return _with_each(light, contour, lambda old: contours.to_polygon(old, tolerance, metric))
+
+
+def size_of(light: AreaLight) -> float:
+    """Return the longer side [m] of the outline's bounding box, as the plane stretches it."""
+    (s0, t0), (s1, t1) = extent_of(light)
+    return max((s1 - s0) * length(light.plane.u), (t1 - t0) * length(light.plane.v), 1e-30)
+
+
+def _with_each(
+    light: AreaLight, contour: int | None, change: Callable[[Contour], Contour]
+) -> AreaLight:
+    own = light.outline.contours
+    changed = tuple(change(old) if contour in (None, i) else old for i, old in enumerate(own))
+    return _with_contours(light, changed) if changed != own else light
+
+
+# Holes
 
 
 def _winding_and_clearance(
-    contours: list[FloatArray], points: FloatArray
+    loops: list[FloatArray], points: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return winding numbers (n,) and distances to the boundary (n,) of points (n, 2)."""
     winding = np.zeros(len(points))
     clearance = np.full(len(points), np.inf)
-    for loop in contours:
+    for loop in loops:
         a = loop[None] - points[:, None]
         way = np.roll(loop, -1, axis=0) - loop
         b = a + way
@@ -170,11 +317,11 @@ def widest_place(light: AreaLight) -> tuple[FloatArray, float, int]:
     Notes
     -----
     A grid of 33 x 33 over the bounding box, refined five times about its best
-    point: the "pole of inaccessibility" without a cell queue.
+    point: the "pole of inaccessibility" without a cell queue. Curves count as
+    polygons within `FINE`.
     """
-    metric = metric_from_plane(light.plane)
-    contours = [np.asarray(contour.points) @ metric.T for contour in light.outline.contours]
-    corners = np.concatenate(contours)
+    loops, _ = _loops(light)
+    corners = np.concatenate(loops)
     low, high = corners.min(0), corners.max(0)
     centre, half = (low + high) / 2.0, (high - low) / 2.0
     best = (centre, 0.0, 0)
@@ -182,7 +329,7 @@ def widest_place(light: AreaLight) -> tuple[FloatArray, float, int]:
         steps = np.linspace(-1.0, 1.0, 33)
         grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         points = centre + grid * half
-        winding, clearance = _winding_and_clearance(contours, points)
+        winding, clearance = _winding_and_clearance(loops, points)
         filled = winding % 2 != 0 if light.outline.fill_rule == "evenodd" else winding != 0
         clearance = np.where(filled, clearance, 0.0)
         index = int(clearance.argmax())
@@ -192,8 +339,8 @@ def widest_place(light: AreaLight) -> tuple[FloatArray, float, int]:
     return best
 
 
-def add_hole(light: AreaLight) -> AreaLight:
-    """Cut a square hole into the widest filled place, half as wide as fits.
+def add_hole(light: AreaLight, shape: Hole = "square") -> AreaLight:
+    """Cut a hole into the widest filled place, half as wide as fits.
 
     Raises
     ------
@@ -209,12 +356,17 @@ def add_hole(light: AreaLight) -> AreaLight:
             "change the fill rule to even-odd first"
         )
     half = 0.5 * clearance
-    square = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
+    hole: Contour = PolygonContour(((-half, -half), (half, -half), (half, half), (-half, half)))
+    if shape == "round":
+        (hole,) = presets.disk(half).contours
     if winding > 0:
-        square = square[::-1]
-    points = (place + square) @ np.linalg.inv(metric_from_plane(light.plane)).T
-    hole = PolygonContour(tuple((float(s), float(t)) for s, t in points))
-    return replace(light, outline=replace(light.outline, contours=(*light.outline.contours, hole)))
+        hole = contours.reverse(hole)
+    to_plane = np.asarray(np.linalg.inv(metric_from_plane(light.plane)), dtype=np.float64)
+    hole = contours.transform(hole, to_plane, to_plane @ place)
+    return _with_contours(light, (*light.outline.contours, hole))
+
+
+# Placement
 
 
 def move_light(light: AreaLight, shift: Vec3) -> AreaLight:
@@ -256,15 +408,19 @@ def aim(light: AreaLight, at: Vec3) -> AreaLight:
 
 
 def flip_light(light: AreaLight) -> AreaLight:
-    """Make the light emit to its other side, the shape unchanged in the world."""
-    contours = tuple(
-        PolygonContour(tuple((-s, t) for s, t in reversed(contour.points)))
-        for contour in light.outline.contours
-    )
+    """Make the light emit to its other side, the shape unchanged in the world.
+
+    Text and drawings are turned about instead, so that they can be read from
+    the side that shines now.
+    """
+    if light.source is not None:
+        return rotate_light(light, normalize(light.plane.v), math.pi)
     return replace(
         light,
         plane=replace(light.plane, u=scale(light.plane.u, -1.0)),
-        outline=replace(light.outline, contours=contours),
+        outline=replace(
+            light.outline, contours=tuple(map(contours.mirror, light.outline.contours))
+        ),
     )
 
 

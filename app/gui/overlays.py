@@ -9,7 +9,7 @@ import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app import camera_control as control
-from app import lights, planes
+from app import contours, lights, planes
 from app.gui import theme
 from app.scene import AreaLight, Camera, Vec3
 from app.vectors import add, scale
@@ -80,7 +80,7 @@ class Canvas:
         plane = light.plane
         axes = np.array([plane.u, plane.v])
         for contour in light.outline.contours:
-            world = np.array(plane.origin) + np.array(contour.points) @ axes
+            world = np.array(plane.origin) + contours.flatten(contour, 1e-3) @ axes
             screen = control.project_all(self.camera, world, self.view.width, self.view.height)
             if screen is not None:
                 points: list[Any] = [
@@ -139,7 +139,7 @@ def middles_of(view: View, camera: Camera, light: AreaLight) -> list[Middle]:
     """Return the middles of a light's edges that are in front of the eye."""
     found = []
     for c, contour in enumerate(light.outline.contours):
-        world = [planes.point_on(light.plane, point) for point in contour.points]
+        world = [planes.point_on(light.plane, point) for point in contours.points_of(contour)]
         for e, (a, b) in enumerate(zip(world, world[1:] + world[:1], strict=True)):
             first, last = view.project(camera, a), view.project(camera, b)
             at = view.project(camera, scale(add(a, b), 0.5))

@@ -27,7 +27,7 @@ from app.gui.placement import box_corners, moved_by, name_of, pose_of, sphere_ar
 from app.gui.shortcuts import key_of
 from app.render.renderer import Hit, Renderer
 from app.scene import AreaLight, Camera, RenderSettings, Scene, SceneError, Shot, Vec2
-from app.vectors import add, length, mix, subtract
+from app.vectors import add, length, subtract
 
 STILL_SAMPLES = 32
 """How many samples per pixel a still picture gathers unless told otherwise."""
@@ -343,8 +343,7 @@ class Viewport:
         if hit is None:
             return None
         contour, edge, along = lights.nearest_edge(light, planes.coordinates_on(plane, hit))
-        points = light.outline.contours[contour].points
-        point = mix(points[edge], points[(edge + 1) % len(points)], along)
+        point = lights.point_along(light, contour, edge, along)
         at = self.view.project(camera, planes.point_on(plane, point))
         if at is None or math.dist(at, (x, y)) > self._unit * HANDLE:
             return None

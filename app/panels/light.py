@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from app import lights, planes
+from app import contours, lights, planes
 from app.panels.widgets import (
     button,
     checkbox,
@@ -78,10 +78,10 @@ def _emission(light: AreaLight) -> AreaLight:
 
 
 def _shape(light: AreaLight, vertex: tuple[int, int] | None) -> tuple[AreaLight, SceneError | None]:
-    contours = light.outline.contours
-    corners = sum(len(contour.points) for contour in contours)
+    loops_now = light.outline.contours
+    corners = sum(map(contours.size_of, loops_now))
     heading("Shape")
-    loops = "1 outline" if len(contours) == 1 else f"{len(contours)} outlines"
+    loops = "1 outline" if len(loops_now) == 1 else f"{len(loops_now)} outlines"
     hint(f"{corners} corners in {loops}")
     failure = None
     width = half_width()
@@ -91,10 +91,10 @@ def _shape(light: AreaLight, vertex: tuple[int, int] | None) -> tuple[AreaLight,
         except SceneError as error:
             failure = error
     imgui.same_line()
-    last = len(contours) - 1
+    last = len(loops_now) - 1
     if button("Remove hole", "Remove the outline added last", enabled=last > 0, width=width):
         light = lights.remove_contour(light, last)
-    if len(contours) > 1:
+    if len(loops_now) > 1:
         rule = choice(
             "Fill rule", light.outline.fill_rule, FILL_RULES,
             "How overlapping outlines combine: even-odd alternates, "
@@ -104,7 +104,7 @@ def _shape(light: AreaLight, vertex: tuple[int, int] | None) -> tuple[AreaLight,
             light = replace(light, outline=replace(light.outline, fill_rule=rule))
     if vertex is not None and vertex[0] < len(light.outline.contours):
         contour, point = vertex
-        at = light.outline.contours[contour].points[point]
+        at = contours.points_of(light.outline.contours[contour])[point]
         s, t = numbers(
             "Corner", at, 0.01, "%.3f", f"Corner {contour}.{point} in the light's own coordinates"
         )

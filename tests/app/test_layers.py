@@ -18,8 +18,8 @@ PURE = {
     "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.curves", "app.curve_arrangement",
     "app.polygon_arrangement", "app.presets", "app.errors", "app.files",
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
-    "app.lights", "app.planes", "app.step_names", "app.gui.messages", "app.gui.shortcuts",
-    "app.gui.beginning", "app.gui.documents",
+    "app.lights", "app.planes", "app.contours", "app.step_names", "app.gui.messages",
+    "app.gui.shortcuts", "app.gui.beginning", "app.gui.documents",
 }  # fmt: skip
 WINDOW = {
     "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",

@@ -1,0 +1,629 @@
+"""What can be done to one closed curve of an outline: pure functions from a contour to a new one.
+
+A contour is a polygon or a chain of cubic Bézier curves; both are spoken of in
+the same words. *Points* are a polygon's corners or a chain's anchors, counted
+from 0. *Segment* i leads from point i to the next one, and a *handle* is named
+by its segment and by 1 or 2, its place in the curve.
+
+Three rules hold throughout, as in Inkscape:
+
+- A straight segment stays straight until it is bent on purpose. Straight means
+  handles at the thirds of the chord (`app.curves.is_straight`), so a line that
+  was bent and pulled straight by hand stays a curve.
+- An anchor's kind is kept by what moves handles. Beside a straight segment a
+  smooth anchor keeps its handle in line with that segment.
+- What changes the shape otherwise weakens a kind that no longer holds
+  (symmetric to smooth to corner) and moves nothing to save it.
+
+Lengths and angles of handles are measured by ``metric``, the (2, 2) matrix from
+plane coordinates to metres (`app.planes.metric_from_plane`): only then does a
+handle on a stretched plane keep the length that one sees.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app import curves as cubic
+from app.curves import is_straight, line_as_cubic
+from app.scene import (
+    AnchorKind,
+    BezierContour,
+    Contour,
+    CubicCurve,
+    PolygonContour,
+    SceneError,
+    Vec2,
+)
+from app.vectors import mix
+
+FloatArray = NDArray[np.float64]
+
+UNIT: FloatArray = np.eye(2)
+"""The metric of a plane whose axes are unit vectors at right angles."""
+
+KINK = math.radians(1.0)
+"""Handles that bend by less are in line: fonts, drawn in whole units, turn short ones so far."""
+
+UNEQUAL = 1e-3
+"""By how much of their length the handles of a symmetric anchor may differ."""
+
+BENT = 0.25
+"""Where on its chord a bent line gets its handles: off the thirds, so that it counts as a curve."""
+
+MOST_PIECES = 256
+"""Into how many pieces `flatten` cuts a curve at most."""
+
+
+# Reading
+
+
+def points_of(contour: Contour) -> tuple[Vec2, ...]:
+    """Return a polygon's corners or a chain's anchors."""
+    return contour.points if isinstance(contour, PolygonContour) else contour.anchors
+
+
+def size_of(contour: Contour) -> int:
+    """Return the number of points, which is also that of segments."""
+    return len(contour.points if isinstance(contour, PolygonContour) else contour.curves)
+
+
+def kinds_of(contour: Contour) -> tuple[AnchorKind, ...]:
+    """Return the kind of every point; corners for a polygon."""
+    if isinstance(contour, BezierContour) and contour.kinds:
+        return contour.kinds
+    corner: AnchorKind = "corner"
+    return (corner,) * size_of(contour)
+
+
+def curves_of(contour: Contour) -> FloatArray:
+    """Return the segments as cubic curves, (n, 4, 2) float64."""
+    if isinstance(contour, BezierContour):
+        return np.array(contour.curves, dtype=np.float64)
+    points = np.array(contour.points, dtype=np.float64)
+    return line_as_cubic(points, np.roll(points, -1, axis=0))
+
+
+def straight_segments(contour: Contour) -> NDArray[np.bool_]:
+    """Return which segments are straight lines, (n,) bool."""
+    if isinstance(contour, PolygonContour):
+        return np.ones(size_of(contour), dtype=bool)
+    return is_straight(curves_of(contour))
+
+
+def handle_of(contour: BezierContour, segment: int, which: int) -> Vec2:
+    """Return the place of a handle."""
+    return contour.curves[segment][which]
+
+
+def anchor_of(contour: BezierContour, segment: int, which: int) -> int:
+    """Return the index of the anchor that a handle belongs to."""
+    return segment if which == 1 else (segment + 1) % len(contour.curves)
+
+
+def point_at(contour: Contour, segment: int, along: float) -> Vec2:
+    """Return the place at the parameter ``along`` in [0, 1] of a segment."""
+    if isinstance(contour, PolygonContour):
+        points = contour.points
+        return mix(points[segment], points[(segment + 1) % len(points)], along)
+    s, t = cubic.evaluate(contour.curves[segment], along).tolist()
+    return (s, t)
+
+
+def bounds(contour: Contour) -> FloatArray:
+    """Return the lower and upper corner (2, 2) of a contour's bounding box, handles left out."""
+    if isinstance(contour, PolygonContour):
+        points = np.array(contour.points, dtype=np.float64)
+        return np.stack([points.min(0), points.max(0)])
+    low, high = cubic.bounds(curves_of(contour))
+    return np.stack([low.min(0), high.max(0)])
+
+
+def flatten(contour: Contour, tolerance: float, metric: FloatArray = UNIT) -> FloatArray:
+    """Return corners (n, 2) of a polygon within a distance of the contour.
+
+    Parameters
+    ----------
+    tolerance : float
+        The largest distance, measured by ``metric``, down to `MOST_PIECES` pieces a curve.
+
+    Notes
+    -----
+    Wang's bound: k equal pieces of a cubic miss it by at most
+    (6 / 8) m / k^2, m the larger second difference of its control points.
+    """
+    if isinstance(contour, PolygonContour):
+        return np.array(contour.points, dtype=np.float64)
+    curves = curves_of(contour)
+    return subdivide(curves, pieces(curves @ metric.T, tolerance))
+
+
+def pieces(curves: FloatArray, tolerance: FloatArray | float) -> NDArray[np.int64]:
+    """Return into how many pieces to cut each curve (n, 4, 2), (n,) int from 1 on.
+
+    ``tolerance`` is the distance allowed, in the curves' unit, of shape () or (n,).
+    """
+    second = np.diff(curves, n=2, axis=1)
+    largest = np.sqrt((second**2).sum(-1)).max(-1)
+    wanted = np.ceil(np.sqrt(0.75 * largest / tolerance))
+    wanted[is_straight(curves)] = 1.0
+    counts: NDArray[np.int64] = np.clip(wanted, 1.0, MOST_PIECES).astype(np.int64)
+    return counts
+
+
+def subdivide(curves: FloatArray, counts: NDArray[np.int64]) -> FloatArray:
+    """Return the points where curves (n, 4, 2) begin and are cut, (sum of counts, 2)."""
+    which = np.repeat(np.arange(len(curves)), counts)
+    first = np.cumsum(counts) - counts
+    along = (np.arange(len(which)) - first[which]) / counts[which]
+    return cubic.evaluate(curves[which], along)
+
+
+def nearest(contour: Contour, at: Vec2, metric: FloatArray = UNIT) -> tuple[float, int, float]:
+    """Return (distance, segment, parameter along it) of the boundary point nearest to ``at``.
+
+    The distance is measured by ``metric``.
+
+    Notes
+    -----
+    Straight segments exactly; of a curve the best of 33 places, then Newton on
+    the squared distance, kept within the two neighbouring places.
+    """
+    target = metric @ np.asarray(at, dtype=np.float64)
+    curves = curves_of(contour) @ metric.T
+    starts, ways = curves[:, 0], curves[:, 3] - curves[:, 0]
+    squares = (ways**2).sum(-1)
+    along = ((target - starts) * ways).sum(-1) / np.where(squares > 0.0, squares, 1.0)
+    along = np.clip(along, 0.0, 1.0)
+    bent = np.flatnonzero(~straight_segments(contour))
+    if len(bent):
+        along[bent] = _nearest_on_curves(curves[bent], target)
+    on = cubic.evaluate(curves, along)
+    distances = np.sqrt(((on - target) ** 2).sum(-1))
+    best = int(distances.argmin())
+    return float(distances[best]), best, float(along[best])
+
+
+def _nearest_on_curves(curves: FloatArray, target: FloatArray) -> FloatArray:
+    places = np.linspace(0.0, 1.0, 33)
+    sampled = cubic.evaluate(curves[:, None], places)
+    first = ((sampled - target) ** 2).sum(-1).argmin(-1)
+    low, high = places[np.maximum(first - 1, 0)], places[np.minimum(first + 1, 32)]
+    at = places[first]
+    second = 6.0 * np.diff(curves, n=2, axis=1)
+    for _ in range(12):
+        away = cubic.evaluate(curves, at) - target
+        speed = cubic.derivative(curves, at)
+        turn = second[:, 0] + at[:, None] * (second[:, 1] - second[:, 0])
+        slope = (away * speed).sum(-1)
+        rise = (speed**2).sum(-1) + (away * turn).sum(-1)
+        # Uphill (rise <= 0) Newton would run to a maximum; bisect towards lower distance there.
+        low, high = np.where(slope < 0.0, at, low), np.where(slope > 0.0, at, high)
+        step = at - slope / np.where(rise > 0.0, rise, 1.0)
+        inside = (rise > 0.0) & (step >= low) & (step <= high)
+        at = np.where(inside, step, 0.5 * (low + high))
+    return np.asarray(at)
+
+
+# Points and handles
+
+
+def move_point(contour: Contour, index: int, to: Vec2, metric: FloatArray = UNIT) -> Contour:
+    """Put a point at ``to``; its handles move along, straight segments beside it stay straight."""
+    target = (float(to[0]), float(to[1]))
+    if isinstance(contour, PolygonContour):
+        points = list(contour.points)
+        points[index] = target
+        return PolygonContour(tuple(points))
+    straight, curves = straight_segments(contour), curves_of(contour)
+    count, before = len(curves), (index - 1) % len(curves)
+    shift = np.array(target) - curves[index, 0]
+    curves[index, :2] += shift
+    curves[before, 2:] += shift
+    curves[index, 0] = curves[before, 3] = target
+    for segment in {index, before}:
+        if straight[segment]:
+            curves[segment] = line_as_cubic(curves[segment, 0], curves[segment, 3])
+    near = {before, index, (index + 1) % count}
+    kinds = _aligned_withline_as_cubic(curves, kinds_of(contour), straight, near, metric)
+    return _chain(curves, kinds)
+
+
+def move_handle(
+    contour: BezierContour,
+    segment: int,
+    which: int,
+    to: Vec2,
+    *,
+    free: bool = False,
+    metric: FloatArray = UNIT,
+) -> BezierContour:
+    """Put a handle at ``to``; the one across its anchor follows as the anchor's kind says.
+
+    Parameters
+    ----------
+    segment, which : int
+        The handle.
+    free : bool
+        Make the anchor a corner and move this handle alone.
+
+    Notes
+    -----
+    Across a straight segment nothing can follow. There the handle stays on the
+    line's extension instead, as long as the pointer says.
+    """
+    curves, kinds = curves_of(contour), list(kinds_of(contour))
+    count, owner = len(curves), anchor_of(contour, segment, which)
+    other = ((segment - 1) % count, 2) if which == 1 else ((segment + 1) % count, 1)
+    anchor = curves[segment, 0 if which == 1 else 3].copy()
+    way = metric @ (np.asarray(to, dtype=np.float64) - anchor)
+    to_plane = np.linalg.inv(metric)
+    if free:
+        kinds[owner] = "corner"
+    if kinds[owner] != "corner" and other[0] != segment and is_straight(curves[other[0]]):
+        far = curves[other[0], 0 if other[1] == 2 else 3]
+        line = _unit(metric @ (anchor - far))
+        way = line * max(float(way @ line), 0.0)
+        curves[segment, which] = anchor + to_plane @ way
+        return _chain(curves, kinds)
+    curves[segment, which] = to
+    if kinds[owner] == "symmetric":
+        curves[other] = 2.0 * anchor - np.asarray(to, dtype=np.float64)
+    elif kinds[owner] == "smooth" and way.any():
+        size = _length(metric @ (curves[other] - anchor))
+        curves[other] = anchor - to_plane @ (_unit(way) * size)
+    return _chain(curves, kinds)
+
+
+def retract_handle(contour: BezierContour, segment: int, which: int) -> BezierContour:
+    """Lay a handle on its anchor, which becomes a corner."""
+    owner = anchor_of(contour, segment, which)
+    return move_handle(contour, segment, which, contour.anchors[owner], free=True)
+
+
+def set_kind(
+    contour: Contour, index: int, kind: AnchorKind, metric: FloatArray = UNIT
+) -> BezierContour:
+    """Make a point a corner, smooth or symmetric, its handles put in line at once.
+
+    The common direction is halfway between the handles', or along a straight
+    segment beside the point; of two straight segments both are bent, parallel to
+    the line between the neighbouring points. Lengths stay; for a symmetric point
+    they become their mean; handles that lie on the point get a third of their
+    chord. A polygon becomes a chain of curves.
+    """
+    chain = to_bezier(contour)
+    curves, kinds = curves_of(chain), list(kinds_of(chain))
+    kinds[index] = kind
+    if kind == "corner":
+        return _chain(curves, kinds)
+    before = (index - 1) % len(curves)
+    anchor = curves[index, 0].copy()
+    into = metric @ (anchor - curves[before, 2])
+    out = metric @ (curves[index, 1] - anchor)
+    from_previous = metric @ (anchor - curves[before, 0])
+    to_next = metric @ (curves[index, 3] - anchor)
+    lengths = [
+        _length(into) or _length(from_previous) / 3.0,
+        _length(out) or _length(to_next) / 3.0,
+    ]
+    lines = is_straight(curves[[before, index]])
+    if lines.all():
+        direction = from_previous + to_next
+    elif lines.any():
+        direction = from_previous if lines[0] else to_next
+    else:
+        direction = _unit(into) + _unit(out)
+        if _length(direction) <= KINK:
+            direction = from_previous + to_next
+    if _length(direction) <= KINK * sum(lengths):
+        direction = np.array([-into[1], into[0]])  # a spike: across it
+    direction = _unit(direction)
+    if kind == "symmetric":
+        lengths = [sum(lengths) / 2.0] * 2
+    to_plane = np.linalg.inv(metric)
+    move_into, move_out = True, True
+    if kind == "smooth" and lines.any() and not lines.all():
+        move_into, move_out = not lines[0], not lines[1]
+    if move_into:
+        curves[before, 2] = anchor - to_plane @ (direction * lengths[0])
+    if move_out:
+        curves[index, 1] = anchor + to_plane @ (direction * lengths[1])
+    return _chain(curves, kinds)
+
+
+def insert(contour: Contour, segment: int, along: float = 0.5) -> Contour:
+    """Add a point on a segment, at the parameter ``along``, without changing the shape.
+
+    It gets the index segment + 1, and is smooth on a curve (de Casteljau's
+    split leaves its handles in line), a corner on a line.
+    """
+    if isinstance(contour, PolygonContour):
+        points = list(contour.points)
+        points.insert(segment + 1, point_at(contour, segment, along))
+        return PolygonContour(tuple(points))
+    curves, kinds = curves_of(contour), list(kinds_of(contour))
+    first, second = cubic.split(curves[segment], along)
+    straight = bool(is_straight(curves[segment]))
+    if straight:
+        first = line_as_cubic(first[0], first[3])
+        second = line_as_cubic(second[0], second[3])
+    grown = np.concatenate([curves[:segment], first[None], second[None], curves[segment + 1 :]])
+    kinds.insert(segment + 1, "corner" if straight else "smooth")
+    ends = (segment, segment + 1, (segment + 2) % len(grown))
+    return _chain(grown, _weakened(grown, kinds, ends))
+
+
+def remove(contour: Contour, index: int) -> Contour | None:
+    """Remove a point; a curve takes the place of the two that met in it.
+
+    It keeps their directions at the far ends and comes as near to them as one
+    cubic does; removing a point that `insert` added gives the curve back. Two
+    lines give a line.
+
+    Returns
+    -------
+    Contour, or None if nothing with an inside remains: fewer than two segments, or
+    two that are straight.
+    """
+    if isinstance(contour, PolygonContour):
+        rest = contour.points[:index] + contour.points[index + 1 :]
+        return PolygonContour(rest) if len(rest) >= 3 else None
+    straight, curves, kinds = straight_segments(contour), curves_of(contour), kinds_of(contour)
+    count = len(curves)
+    if count <= 2:
+        return None
+    # With the point at the end, the two segments that meet there are the last and the first.
+    turn = index
+    curves = np.roll(curves, -turn, axis=0)
+    straight = np.roll(straight, -turn)
+    turned = [kinds[(i + turn) % count] for i in range(count)]
+    before, after = curves[-1], curves[0]
+    if straight[-1] and straight[0]:
+        merged = line_as_cubic(before[0], after[3])
+    else:
+        merged = _merged(before, after)
+    rest_curves = np.concatenate([curves[1:-1], merged[None]])
+    rest_kinds = turned[1:]
+    if len(rest_curves) < 3 and is_straight(rest_curves).all():
+        return None
+    # Back to the order it had: the point that was first stays first if it is still there.
+    back = -(turn - 1) % (count - 1) if turn else 0
+    rest_curves = np.roll(rest_curves, -back, axis=0)
+    rest_kinds = [rest_kinds[(i + back) % (count - 1)] for i in range(count - 1)]
+    place = (index - 1) % (count - 1)
+    ends = (place, (place + 1) % (count - 1))
+    return _chain(rest_curves, _weakened(rest_curves, rest_kinds, ends))
+
+
+# Segments
+
+
+def straighten(contour: Contour, segment: int) -> Contour:
+    """Make a segment a straight line; the rest stays as it is."""
+    if isinstance(contour, PolygonContour):
+        return contour
+    curves = curves_of(contour)
+    curves[segment] = line_as_cubic(curves[segment, 0], curves[segment, 3])
+    ends = (segment, (segment + 1) % len(curves))
+    return _chain(curves, _weakened(curves, kinds_of(contour), ends))
+
+
+def bend(contour: Contour, segment: int) -> BezierContour:
+    """Give a straight segment handles to pull at; the shape stays. A curve stays as it is."""
+    chain = to_bezier(contour)
+    curves = curves_of(chain)
+    start, end = curves[segment, 0].copy(), curves[segment, 3].copy()
+    retracted = np.array_equal(curves[segment, 1], start) and np.array_equal(
+        curves[segment, 2], end
+    )
+    if not (retracted or is_straight(curves[segment])):
+        return chain
+    curves[segment, 1] = start + BENT * (end - start)
+    curves[segment, 2] = end - BENT * (end - start)
+    return _chain(curves, kinds_of(chain))
+
+
+# Whole contours
+
+
+def reverse(contour: Contour) -> Contour:
+    """Go around the other way; the first point stays the first."""
+    if isinstance(contour, PolygonContour):
+        return PolygonContour((contour.points[0], *contour.points[:0:-1]))
+    kinds = kinds_of(contour)
+    return _chain(curves_of(contour)[::-1, ::-1], (kinds[0], *kinds[:0:-1]))
+
+
+def mirror(contour: Contour) -> Contour:
+    """Change the sign of s, and go around the other way, which keeps the winding."""
+    return transform(reverse(contour), np.diag((-1.0, 1.0)), np.zeros(2))
+
+
+def transform(contour: Contour, matrix: FloatArray, shift: FloatArray) -> Contour:
+    """Return the contour under the map x -> matrix (2, 2) x + shift (2,)."""
+    if isinstance(contour, PolygonContour):
+        points = (np.array(contour.points) @ matrix.T + shift).tolist()
+        return PolygonContour(tuple((s, t) for s, t in points))
+    return _chain(curves_of(contour) @ matrix.T + shift, kinds_of(contour))
+
+
+def split(contour: Contour, first: int, second: int) -> tuple[Contour, Contour]:
+    """Cut a contour in two along the straight line between two of its points.
+
+    Outlines are always closed, so this is what breaking a path at two points and
+    closing both parts comes to. The first part begins at the lower of the two.
+
+    Raises
+    ------
+    SceneError
+        If a part would have no inside: the points are one, or joined by a line.
+    """
+    low, high = sorted((first, second))
+    count, straight = size_of(contour), straight_segments(contour)
+    beside = (high - low == 1 and straight[low]) or (high - low == count - 1 and straight[high])
+    if low == high or beside:
+        raise SceneError(
+            "an outline cannot be split between points that are one or joined by a straight "
+            "line, expected two others"
+        )
+    if isinstance(contour, PolygonContour):
+        inner = contour.points[low : high + 1]
+        outer = contour.points[high:] + contour.points[: low + 1]
+        return PolygonContour(inner), PolygonContour(outer)
+    curves, kinds = curves_of(contour), kinds_of(contour)
+    parts = []
+    for chosen in ([*range(low, high)], [*range(high, count), *range(low)]):
+        part = curves[chosen]
+        closing = line_as_cubic(part[-1, 3], part[0, 0])
+        inner_kinds = [kinds[i] for i in chosen[1:]]
+        parts.append(
+            _chain(np.concatenate([part, closing[None]]), ["corner", *inner_kinds, "corner"])
+        )
+    return parts[0], parts[1]
+
+
+def to_bezier(contour: Contour) -> BezierContour:
+    """Return the same shape as a chain of curves."""
+    return contour if isinstance(contour, BezierContour) else _chain(curves_of(contour), ())
+
+
+def to_polygon(contour: Contour, tolerance: float, metric: FloatArray = UNIT) -> PolygonContour:
+    """Return a polygon within a distance of the contour, measured by ``metric``, see `flatten`."""
+    if isinstance(contour, PolygonContour):
+        return contour
+    curves = curves_of(contour)
+    counts = pieces(curves @ metric.T, tolerance)
+    if counts.sum() < 3:
+        counts[:] = 3
+    points = subdivide(curves, counts).tolist()
+    return PolygonContour(tuple((s, t) for s, t in points))
+
+
+# Inside
+
+
+def _length(vector: FloatArray) -> float:
+    return math.hypot(*vector.tolist())
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    """Return the direction of a vector, zero for the zero vector."""
+    size = _length(vector)
+    return vector / size if size > 0.0 else vector
+
+
+def _chain(curves: FloatArray, kinds: Iterable[AnchorKind]) -> BezierContour:
+    """Return curves (n, 4, 2) as a contour; what begins where another ends does so exactly."""
+    rows = curves.tolist()
+    joined: list[CubicCurve] = []
+    for row, following in zip(rows, rows[1:] + rows[:1], strict=True):
+        a, b, c = ((p[0], p[1]) for p in row[:3])
+        joined.append((a, b, c, (following[0][0], following[0][1])))
+    kept = tuple(kinds)
+    return BezierContour(tuple(joined), kept if any(kind != "corner" for kind in kept) else ())
+
+
+def _weakened(
+    curves: FloatArray, kinds: Iterable[AnchorKind], indices: Iterable[int]
+) -> list[AnchorKind]:
+    """Return the kinds with those at ``indices`` weakened to what their handles still keep."""
+    result = list(kinds)
+    for index in indices:
+        into = curves[index, 0] - curves[index - 1, 2]
+        out = curves[index, 1] - curves[index, 0]
+        size = min(_length(into), _length(out))
+        if result[index] == "symmetric" and _length(into - out) > UNEQUAL * size:
+            result[index] = "smooth"
+        if result[index] == "smooth":
+            gap = _length(_unit(into) - _unit(out))
+            if size == 0.0 or gap > KINK:
+                result[index] = "corner"
+    return result
+
+
+def _aligned_withline_as_cubic(
+    curves: FloatArray,
+    kinds: Iterable[AnchorKind],
+    straight: NDArray[np.bool_],
+    indices: Iterable[int],
+    metric: FloatArray,
+) -> list[AnchorKind]:
+    """Turn handles of smooth anchors, in place, into line with a straight segment beside them."""
+    result, to_plane = list(kinds), np.linalg.inv(metric)
+    for index in indices:
+        before = (index - 1) % len(curves)
+        if result[index] == "corner" or not (straight[before] or straight[index]):
+            continue
+        if straight[before] and straight[index]:
+            result = _weakened(curves, result, [index])
+            continue
+        anchor = curves[index, 0]
+        far = curves[before, 0] if straight[before] else curves[index, 3]
+        away = _unit(metric @ (anchor - far))
+        handle = (index, 1) if straight[before] else (before, 2)
+        size = _length(metric @ (curves[handle] - anchor))
+        curves[handle] = anchor + to_plane @ (away * size)
+        result[index] = "smooth"
+    return result
+
+
+def _tangents(curves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return unit directions (2,) from both ends of a chain of control points (n, 2) inwards."""
+    ends = []
+    for points in (curves, curves[::-1]):
+        ways = points[1:] - points[0]
+        sizes = np.sqrt((ways**2).sum(-1))
+        found = np.flatnonzero(sizes > 1e-12 * max(float(sizes.max()), 1e-300))
+        ends.append(_unit(ways[found[0]]) if len(found) else np.zeros(2))
+    return ends[0], ends[1]
+
+
+def _merged(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return the cubic (4, 2) that comes nearest to two that meet.
+
+    Notes
+    -----
+    Its ends and directions there are theirs; the lengths of its handles are the
+    least-squares solution over 32 samples a curve, whose parameters are put at
+    the nearest points between rounds: Schneider, An Algorithm for Automatically
+    Fitting Digitized Curves, Graphics Gems (1990). The first parameters are
+    those of a split, so that a curve that was split is found at once.
+    """
+    start, end = before[0], after[3]
+    head, tail = _tangents(np.concatenate([before, after[1:]]))
+    left, right = _length(before[3] - before[2]), _length(after[1] - after[0])
+    if not left + right > 0.0:
+        left, right = _length(before[3] - before[0]), _length(after[3] - after[0])
+    share = left / (left + right) if left + right > 0.0 else 0.5
+    share = min(max(share, 0.02), 0.98)
+    along = np.linspace(0.0, 1.0, 33)
+    samples = np.concatenate([cubic.evaluate(before, along), cubic.evaluate(after, along[1:])])
+    places = np.concatenate([share * along, share + (1.0 - share) * along[1:]])
+    span = _length(end - start) or _length(before[3] - start)
+    best, least = line_as_cubic(start, end), math.inf
+    for _ in range(8):
+        rest = 1.0 - places
+        fixed = cubic.evaluate(np.stack([start, start, end, end]), places)
+        inner = 3.0 * np.stack([places * rest**2, places**2 * rest], axis=-1)
+        system = inner[:, None, :] * np.stack([head, tail], axis=-1)
+        sizes = np.linalg.lstsq(system.reshape(-1, 2), (samples - fixed).reshape(-1), rcond=1e-12)[
+            0
+        ]
+        sizes = np.where(sizes > 1e-3 * span, sizes, span / 3.0)
+        curve = np.stack([start, start + sizes[0] * head, end + sizes[1] * tail, end])
+        miss = cubic.evaluate(curve, places) - samples
+        error = float((miss**2).sum())
+        if error < least:
+            best, least = curve, error
+        if error <= 1e-24 * span**2:
+            break
+        speed = cubic.derivative(curve, places)
+        squares = (speed**2).sum(-1)
+        shift = (miss * speed).sum(-1) / np.where(squares > 0.0, squares, 1.0)
+        places = np.clip(places - shift, 0.0, 1.0)
+    return best
