@@ -21,7 +21,10 @@ from app.render.pack import (
     TEXELS_PER_EDGE,
     TEXELS_PER_LIGHT,
     TEXELS_PER_MATERIAL,
+    TEXELS_PER_NODE,
+    has_curves,
     light_geometry,
+    node_count,
 )
 from app.render.techniques import DEFAULT_TECHNIQUE, find_technique
 from app.scene import AreaLight, Scene
@@ -64,12 +67,14 @@ def _rounded(count: int) -> int:
 class LightNeeds:
     """The lights of a scene that reach surfaces.
 
+    ``parts`` counts edges, or where a light has curves the nodes of all trees;
     ``uniform_texels`` is the uniform block's array length, 0 where the lights
     need a texture (or there are none).
     """
 
     count: int
-    edges: int
+    parts: int
+    curved: bool
     texels: int
     one_sided: bool
     two_sided: bool
@@ -81,33 +86,42 @@ class LightNeeds:
         """Raise `InputError` if the lights are more, or larger, than the machine can hold."""
         geometries = [light_geometry(light) for light in lights]
         shining = [
-            (light, len(geometry.edges))
+            light
             for light, geometry in zip(lights, geometries, strict=True)
-            if any(light.radiance) and len(geometry.edges)
+            if any(light.radiance) and geometry.parts
         ]
-        edges = sum(count for _, count in shining)
-        texels = TEXELS_PER_LIGHT * len(lights) + TEXELS_PER_EDGE * edges
+        curved = has_curves(lights)
+        parts = sum(node_count(item) if curved else light_geometry(item).parts for item in shining)
+        size = TEXELS_PER_NODE if curved else TEXELS_PER_EDGE
+        texels = TEXELS_PER_LIGHT * len(lights) + size * parts
         if texels > limits.storage_texels:
             raise InputError(
-                f"lights: {len(lights)} lights with {edges} edges need {texels} records, "
-                f"expected at most {limits.storage_texels} on this machine"
+                f"lights: {len(lights)} lights with {parts} {'curves' if curved else 'edges'} "
+                f"need {texels} records, expected at most {limits.storage_texels} on this machine"
             )
         rounded = _rounded(texels)
         return cls(
             len(lights),
-            edges,
+            parts,
+            curved,
             texels,
-            any(not light.two_sided for light, _ in shining),
-            any(light.two_sided for light, _ in shining),
+            any(not light.two_sided for light in shining),
+            any(light.two_sided for light in shining),
             rounded if 16 * rounded <= limits.uniform_block_bytes else 0,
             limits.exact_fma,
         )
+
+    @property
+    def part_name(self) -> str:
+        """What ``parts`` counts."""
+        return "node" if self.curved else "edge"
 
     def defines(self) -> dict[str, int]:
         """Return the numbers that shaders which read lights are assembled with."""
         return {
             "HAS_ONE_SIDED": int(self.one_sided),
             "HAS_TWO_SIDED": int(self.two_sided),
+            "HAS_CURVES": int(self.curved),
             "HAS_EXACT_FMA": int(self.exact_fma),
             "LIGHT_STORAGE_UNIFORM": int(self.uniform_texels > 0),
             "LIGHT_TEXELS": self.uniform_texels,
@@ -167,7 +181,7 @@ class LightingFeatures:
         return cls(
             specular,
             diffuse,
-            any(light.visible and len(light_geometry(light).edges) for light in scene.lights),
+            any(light.visible and light_geometry(light).parts for light in scene.lights),
             samples > 1,
             lights,
             rounded if fits else 0,

@@ -17,19 +17,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.curves import derivative, evaluate, line_as_cubic
 from app.errors import InputError
-from app.outline import resolve, triangulate
+from app.outline import boundary, resolve, triangulate
 from app.render.caching import ByteCache
-from app.scene import AreaLight, Material, Plane
+from app.render.contour_tree import contour_tree
+from app.scene import AreaLight, BezierContour, Material, Plane
 
 FloatArray = NDArray[np.float64]
 
 LIGHT_HEADER = np.dtype(
     [
         ("origin", "<f4", 3),
-        ("first_edge", "<f4"),
+        ("first_part", "<f4"),
         ("u", "<f4", 3),
-        ("edge_count", "<f4"),
+        ("part_count", "<f4"),
         ("v", "<f4", 3),
         ("radius", "<f4"),
         ("n", "<f4", 3),
@@ -65,10 +67,13 @@ LIGHT_VERTEX = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("id", "<
 TEXELS_PER_LIGHT = LIGHT_HEADER.itemsize // 16
 TEXELS_PER_MATERIAL = MATERIAL_RECORD.itemsize // 16
 TEXELS_PER_EDGE = 2
+TEXELS_PER_NODE = 4
 MAX_INDEX = 2**24
 """Texel indices are stored as float32."""
 CACHED_BYTES = 16 * 2**20
 """Of each of the three things that are kept of every light."""
+SMALLEST_AREA = 1e-30
+"""[m^2] Added to an inner node's area, whose sign says that it is one."""
 SMALLEST_NUMBER = 1e-12
 """Lengths [m] and scales up to here would vanish from products of three."""
 LARGEST_NUMBER = 1e12
@@ -85,8 +90,9 @@ class LightGeometry:
         Area centroid of the outline, world.
     u, v : (3,) float64
         Orthonormal, u x v is the emitting normal.
-    edges : (n, 4) float64
-        (a.s, a.t, b.s, b.t) about the origin [m], interior on the left.
+    loops : tuple of (k, 2) or (k, 4, 2) float64
+        Simple closed loops about the origin [m], interior on the left: vertices,
+        or cubics where the outline has curves.
     radius : float
         Bounding radius about the origin [m].
     """
@@ -94,8 +100,17 @@ class LightGeometry:
     origin: FloatArray
     u: FloatArray
     v: FloatArray
-    edges: FloatArray
+    loops: tuple[FloatArray, ...]
     radius: float
+
+    @property
+    def parts(self) -> int:
+        """Edges, straight or curved."""
+        return sum(len(loop) for loop in self.loops)
+
+    @property
+    def bytes(self) -> int:
+        return sum(loop.nbytes for loop in self.loops)
 
 
 def plane_basis(plane: Plane) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -138,52 +153,119 @@ def _checked_geometry(light: AreaLight) -> LightGeometry:
     return geometry
 
 
+def is_curved(light: AreaLight) -> bool:
+    """Return whether a light's outline has Bézier contours."""
+    return any(isinstance(contour, BezierContour) for contour in light.outline.contours)
+
+
+def has_curves(lights: Sequence[AreaLight]) -> bool:
+    """Return whether some light that shines has curves."""
+    return any(any(light.radiance) and is_curved(light) for light in lights)
+
+
 def _light_geometry(light: AreaLight) -> LightGeometry:
     e1, e2, to_metres = plane_basis(light.plane)
-    loops = [loop @ to_metres.T for loop in resolve(light.outline)]
+    inside = boundary(light.outline) if is_curved(light) else resolve(light.outline)
+    loops = [loop @ to_metres.T for loop in inside]
     if not loops:
-        return LightGeometry(np.array(light.plane.origin), e1, e2, np.zeros((0, 4)), 0.0)
+        return LightGeometry(np.array(light.plane.origin), e1, e2, (), 0.0)
     centroid = _centroid(loops)
-    edges = np.concatenate(
-        [np.hstack([loop, np.roll(loop, -1, axis=0)]) - np.tile(centroid, 2) for loop in loops]
-    )
-    radius = float(np.sqrt((edges[:, :2] ** 2).sum(axis=1).max()))
+    about = tuple(loop - centroid for loop in loops)
+    radius = max(float(np.sqrt((loop**2).sum(axis=-1).max())) for loop in about)
     origin = np.array(light.plane.origin) + centroid[0] * e1 + centroid[1] * e2
-    return LightGeometry(origin, e1, e2, edges, radius)
+    return LightGeometry(origin, e1, e2, about, radius)
+
+
+MOMENT_NODES, MOMENT_WEIGHTS = np.polynomial.legendre.leggauss(5)
+"""Exact for the moments of cubics, whose integrands have degree 8."""
 
 
 def _centroid(loops: Sequence[FloatArray]) -> FloatArray:
     """Return the area centroid of loops whose areas add up to more than zero."""
-    pivot = loops[0][0]
+    pivot = loops[0].reshape(-1, 2)[0]
     area = 0.0
     moment = np.zeros(2)
     for loop in loops:
-        a = loop - pivot
-        b = np.roll(a, -1, axis=0)
-        cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        if loop.ndim == 3:
+            curves = (loop - pivot)[:, None]
+            t = 0.5 + 0.5 * MOMENT_NODES
+            middle, way = evaluate(curves, t), derivative(curves, t)
+            weights = 0.5 * MOMENT_WEIGHTS
+        else:
+            a = (loop - pivot)[:, None]
+            way = np.roll(a, -1, axis=0) - a
+            # Over an edge p varies linearly and p x p' not at all: its middle will do.
+            middle, weights = a + 0.5 * way, np.ones(1)
+        cross = (middle[..., 0] * way[..., 1] - middle[..., 1] * way[..., 0]) * weights
         area += float(cross.sum())
-        moment += (cross[:, None] * (a + b)).sum(axis=0)
-    return np.asarray(pivot + moment / (3.0 * area))
+        moment += np.einsum("ij,ijk->k", cross, middle)
+    return np.asarray(pivot + moment / (1.5 * area))
+
+
+def edges_of(loops: Sequence[FloatArray]) -> FloatArray:
+    """Return the edges (n, 4) of polygons: (a.s, a.t, b.s, b.t)."""
+    return np.concatenate(
+        [np.zeros((0, 4)), *(np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops)]
+    )
 
 
 def pack_lights(lights: Sequence[AreaLight]) -> NDArray[np.float32]:
-    """Return (n, 4) float32 texels: all headers, then all edges.
+    """Return (n, 4) float32 texels: all headers, then all edges, or all nodes.
 
-    A light without radiance keeps its header and gets no edges: nothing to integrate.
+    If one light has curves (`has_curves`) every light's outline becomes a tree, so
+    that one walk serves all. A light without radiance keeps its header and gets no
+    outline: nothing to integrate.
     """
-    packed = [_packed(light) for light in lights]
+    pack = _packed_tree if has_curves(lights) else _packed_edges
+    packed = [pack(light) for light in lights]
     header = np.concatenate([np.zeros(0, LIGHT_HEADER), *(record for record, _ in packed)])
-    counts = np.array([len(edges) for _, edges in packed], dtype=np.int64)
+    counts = np.array([len(parts) for _, parts in packed], dtype=np.int64)
     before = np.cumsum(counts) - counts
-    header["first_edge"] = TEXELS_PER_LIGHT * len(lights) + before
+    header["first_part"] = TEXELS_PER_LIGHT * len(lights) + before
     texels = header.view(np.float32).reshape(-1, 4)
-    return np.concatenate([texels, *(edges for _, edges in packed)])
+    return np.concatenate([texels, *(parts for _, parts in packed)])
 
 
-def _packed_light(light: AreaLight) -> tuple[NDArray[np.void], NDArray[np.float32]]:
-    """Return a header (1,), still without its first edge, and the texels (2 edges, 4)."""
+def node_count(light: AreaLight) -> int:
+    """Return the nodes of a light's tree, see `app.render.contour_tree`."""
+    return len(_packed_tree(light)[1]) // TEXELS_PER_NODE
+
+
+Packed = tuple[NDArray[np.void], NDArray[np.float32]]
+"""A header (1,), still without its first part, and texels (n, 4)."""
+
+
+def _pack_edges(light: AreaLight) -> Packed:
     geometry = light_geometry(light)
-    edges = geometry.edges if any(light.radiance) else geometry.edges[:0]
+    edges = edges_of(geometry.loops if any(light.radiance) else ())
+    return _header(light, geometry, len(edges)), np.stack(_split(edges), axis=1).reshape(-1, 4)
+
+
+def _pack_tree(light: AreaLight) -> Packed:
+    geometry = light_geometry(light)
+    if not geometry.loops or not any(light.radiance):
+        return _header(light, geometry, 0), np.zeros((0, 4), np.float32)
+    curves = [
+        loop if loop.ndim == 3 else line_as_cubic(loop, np.roll(loop, -1, axis=0))
+        for loop in geometry.loops
+    ]
+    tree = contour_tree(curves)
+    ends = tree.curves[:, [0, 3]].reshape(-1, 4)
+    texels = np.zeros((len(ends), TEXELS_PER_NODE, 4), np.float32)
+    texels[:, 0], texels[:, 1] = _split(ends)
+    texels[:, 2, :2] = tree.disc[:, :2]
+    texels[:, 2, 2:] = np.stack([tree.disc[:, 2], tree.area], axis=1) * (1.0 + 1e-6)
+    # Handles from their own ends, which they are close to; inner nodes say where
+    # their subtree ends by a negative index.
+    steps = tree.curves[:, 1:3] - tree.curves[:, [0, 3]]
+    texels[:, 3] = steps.reshape(-1, 4)
+    inner = ~tree.is_leaf
+    texels[inner, 2, 3] = -texels[inner, 2, 3] - np.float32(SMALLEST_AREA)
+    texels[inner, 3, 0] = tree.skip[inner]
+    return _header(light, geometry, len(ends)), texels.reshape(-1, 4)
+
+
+def _header(light: AreaLight, geometry: LightGeometry, parts: int) -> NDArray[np.void]:
     record = np.zeros(1, dtype=LIGHT_HEADER)
     for name, vector in (
         ("origin", geometry.origin),
@@ -192,12 +274,12 @@ def _packed_light(light: AreaLight) -> tuple[NDArray[np.void], NDArray[np.float3
         ("n", np.cross(geometry.u, geometry.v)),
     ):
         record[name], record[f"{name}_low"] = _split(vector)
-    record["edge_count"] = len(edges)
+    record["part_count"] = parts
     # Rounded up: the shader skips what this circle says is below the surface.
     record["radius"] = np.float32(geometry.radius) * np.float32(1.0 + 1e-6)
     record["two_sided"] = light.two_sided
     record["red"], record["green"], record["blue"] = light.radiance
-    return record, np.stack(_split(edges), axis=1).reshape(-1, 4)
+    return record
 
 
 def _split(values: FloatArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -258,6 +340,7 @@ def _counter_clockwise(points: FloatArray, triangles: NDArray[np.int32]) -> NDAr
 
 
 # Hashing and per-entry overhead are worth about 1 KB.
-_geometries = ByteCache(_checked_geometry, lambda g: 1024 + g.edges.nbytes, CACHED_BYTES)
-_packed = ByteCache(_packed_light, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
+_geometries = ByteCache(_checked_geometry, lambda g: 1024 + g.bytes, CACHED_BYTES)
+_packed_edges = ByteCache(_pack_edges, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
+_packed_tree = ByteCache(_pack_tree, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
 _triangles = ByteCache(_light_triangles, lambda t: 1024 + t.nbytes, CACHED_BYTES)

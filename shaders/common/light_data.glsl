@@ -1,13 +1,19 @@
 // Planar lights as an array of vec4 "texels", packed by app/render/pack.py.
 //
-// Eight header texels a light, at texel 8 * light, then two texels an edge anywhere after:
-//   0: origin_ws.xyz, index of the first edge texel
-//   1: u.xyz,         number of edges
+// Eight header texels a light, at texel 8 * light, then its outline anywhere after:
+//   0: origin_ws.xyz, index of the outline's first texel
+//   1: u.xyz,         number of its edges, or nodes
 //   2: v.xyz,         bounding radius about the origin [m]
 //   3: n.xyz = u x v, 1 if the light emits to both sides
 //   4 to 7: what rounding to float32 took from origin, u, v, n; radiance in the w of 4 to 6
 //   edge: (a.s, a.t, b.s, b.t) [m] in the orthonormal basis u, v about the origin,
 //         interior on the left seen from the emitting side, that of n; then what rounding took.
+//
+// Where some light has curves every outline is a tree instead (app/render/contour_tree.py),
+// four texels a node in depth-first order:
+//   0, 1: its ends, as an edge's
+//   2: disc around it: center.st, radius; area between node and chord, negative for inner nodes
+//   3: leaves: both handles from their ends; inner nodes: the node after the subtree
 //
 // Twice float32, because a point a millimetre from an outline metres away sees a
 // rounding of its coordinates (1e-7 m) as 1e-4 rad, a tenth of a sharp lobe.
@@ -28,8 +34,8 @@ struct PlanarLight {
     vec3 n_low;
     vec3 radiance;
     float radius;
-    int first_edge;
-    int edge_count;
+    int first_part;
+    int part_count;
     bool two_sided;
 };
 
@@ -55,8 +61,8 @@ PlanarLight light_at(int index)
     light.n_low = t7.xyz;
     light.radiance = vec3(t4.w, t5.w, t6.w);
     light.radius = t2.w;
-    light.first_edge = int(t0.w);
-    light.edge_count = int(t1.w);
+    light.first_part = int(t0.w);
+    light.part_count = int(t1.w);
     light.two_sided = t3.w != 0.0;
     return light;
 }

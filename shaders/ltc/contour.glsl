@@ -1,4 +1,4 @@
-// Walk a light's outline edge by edge, clipped at the surface's horizon; form factor of
+// Walk a light's outline part by part, clipped at the surface's horizon; form factor of
 // what is left. Shared by every technique.
 //
 // Crossings of the horizon all lie on one line of the light's plane and come in
@@ -8,6 +8,9 @@
 
 #include "common/light_data.glsl"
 #include "ltc/polygon.glsl"
+#if HAS_CURVES
+#include "ltc/curve.glsl"
+#endif
 
 struct Contour {
     // Height above the surface of (s, t) about the anchor: base + slope . (s, t).
@@ -18,7 +21,11 @@ struct Contour {
     bool closing;      // whether an edge along the horizon comes next
     vec2 closing_from;
     vec2 closing_to;
-    int next;
+    int next;          // edge, or node of the tree
+#if HAS_CURVES
+    float from;        // where on the curve at `next` to go on, 0 at its start
+    bool above;        // whether the curve is above the surface there
+#endif
 };
 
 Contour contour_start(PlanarLight light, PlaneView view, CosineLight anchored, vec3 normal)
@@ -26,53 +33,66 @@ Contour contour_start(PlanarLight light, PlaneView view, CosineLight anchored, v
     vec2 slope = vec2(dot(normal, light.u), dot(normal, light.v));
     float base = anchored.pin > 0.0 ? dot(normal, view.offset)
                                     : view.depth * dot(normal, light.n);
-    return Contour(slope, base, vec2(0.0), false, false, vec2(0.0), vec2(0.0), 0);
+    return Contour(slope, base, vec2(0.0), false, false, vec2(0.0), vec2(0.0), 0
+#if HAS_CURVES
+                   , 0.0, false
+#endif
+    );
 }
 
 bool contour_ends(PlanarLight light, Contour contour)
 {
-    return !contour.closing && contour.next >= light.edge_count;
+    return !contour.closing && contour.next >= light.part_count;
 }
 
-// The next edge about the anchor; false where it lies below the horizon. Edges that close
-// the outline come out of the same call, so that a caller's integral is compiled
-// once: in three copies it took 1.6 times as long.
-bool contour_edge(
-    PlanarLight light, CosineLight anchored, inout Contour contour, out PlanarEdge edge)
+// The edge along the horizon between the two crossings met last.
+PlanarEdge closing_edge(inout Contour contour)
 {
+    contour.closing = false;
+    // Direction and moment of the horizon line itself, base + slope . x = 0: the
+    // rounded ends would tilt edges that are short or pass close by.
     vec2 slope = contour.slope;
-    float base = contour.base;
-    if (contour.closing) {
-        contour.closing = false;
-        // Direction and moment of the horizon line itself, base + slope . x = 0: the
-        // rounded ends would tilt edges that are short or pass close by.
-        vec2 along = vec2(-slope.y, slope.x);
-        float length_along =
-            dot(contour.closing_to - contour.closing_from, along) / dot(slope, slope);
-        edge = PlanarEdge(contour.closing_from, contour.closing_to, length_along * along,
-                          -length_along * base);
-        return true;
-    }
-    int texel = light.first_edge + 2 * contour.next;
-    ++contour.next;
-    edge = planar_edge(
-        light_texel(texel), light_texel(texel + 1), anchored.anchor, anchored.anchor_low);
-    // `precise`: an edge's end and the next one's start must agree to the bit.
-    precise float za = base + edge.a.x * slope.x + edge.a.y * slope.y;
-    precise float zb = base + edge.b.x * slope.x + edge.b.y * slope.y;
+    vec2 along = vec2(-slope.y, slope.x);
+    float length_along =
+        dot(contour.closing_to - contour.closing_from, along) / dot(slope, slope);
+    return PlanarEdge(contour.closing_from, contour.closing_to, length_along * along,
+                      -length_along * contour.base);
+}
+
+// The outline meets the horizon, from above or from below.
+void meet_horizon(inout Contour contour, vec2 crossing, bool from_above)
+{
+    contour.closing_from = from_above ? crossing : contour.pending;
+    contour.closing_to = from_above ? contour.pending : crossing;
+    contour.closing = contour.has_pending;
+    contour.has_pending = !contour.has_pending;
+    contour.pending = crossing;
+}
+
+// Height of a point about the anchor above the surface. `precise`: what ends at a
+// vertex and what starts there must agree to the bit.
+float height_of(Contour contour, vec2 point)
+{
+    precise float z = contour.base + point.x * contour.slope.x + point.y * contour.slope.y;
+    return z;
+}
+
+// Cut off what is below the surface; false if that is all of the edge.
+bool clip_edge(inout Contour contour, inout PlanarEdge edge)
+{
+    float za = height_of(contour, edge.a);
+    float zb = height_of(contour, edge.b);
     bool a_above = za > 0.0;
     bool b_above = zb > 0.0;
     if (a_above != b_above) {
         // Where edge line and horizon line meet; going there from a or b would
         // lose a crossing near the anchor between far ends.
+        vec2 slope = contour.slope;
+        float base = contour.base;
         vec2 crossing = vec2(edge.moment * slope.y - base * edge.d.x,
                              -edge.moment * slope.x - base * edge.d.y) /
                         dot(slope, edge.d);
-        contour.closing_from = a_above ? crossing : contour.pending;
-        contour.closing_to = a_above ? contour.pending : crossing;
-        contour.closing = contour.has_pending;
-        contour.has_pending = !contour.has_pending;
-        contour.pending = crossing;
+        meet_horizon(contour, crossing, a_above);
         float share = (a_above ? za : zb) / abs(za - zb);
         edge.a = a_above ? edge.a : crossing;
         edge.b = a_above ? crossing : edge.b;
@@ -80,6 +100,25 @@ bool contour_edge(
         edge.moment *= share;
     }
     return a_above || b_above;
+}
+
+#if !HAS_CURVES
+
+// The next edge about the anchor; false where it lies below the horizon. Edges that close
+// the outline come out of the same call, so that a caller's integral is compiled
+// once: in three copies it took 1.6 times as long.
+bool contour_edge(
+    PlanarLight light, CosineLight anchored, inout Contour contour, out PlanarEdge edge)
+{
+    if (contour.closing) {
+        edge = closing_edge(contour);
+        return true;
+    }
+    int texel = light.first_part + 2 * contour.next;
+    ++contour.next;
+    edge = planar_edge(
+        light_texel(texel), light_texel(texel + 1), anchored.anchor, anchored.anchor_low);
+    return clip_edge(contour, edge);
 }
 
 // Form factor, under the transform, of the part of a light above the surface.
@@ -97,6 +136,132 @@ float light_form_factor(
     }
     return form_factor(transformed, sum);
 }
+
+#else
+
+// Largest radiance that a node's chord may be wrong by, of a light of radiance 1.
+const float CHORD_ERROR = 1e-5;
+
+// What bounds the cosine lobe's density over parts of a light's plane.
+struct LobeBound {
+    CosineLight lobe;
+    float scale;     // density [1/m^2] = scale z / |r|^4
+    float distance;  // of the transformed plane
+    float stretch;   // lengths grow by this at most
+    float rise;      // z grows by this at most, per metre
+};
+
+LobeBound lobe_bound(CosineLight lobe)
+{
+    float uu = dot(lobe.u, lobe.u);
+    float vv = dot(lobe.v, lobe.v);
+    float uv = dot(lobe.u, lobe.v);
+    float volume = abs(dot(lobe.center, lobe.u_cross_v));
+    // The larger eigenvalue of the Gram matrix.
+    float stretch2 = 0.5 * (uu + vv + length(vec2(uu - vv, 2.0 * uv)));
+    return LobeBound(lobe, 0.318309886 * volume, volume / length(lobe.u_cross_v),
+                     sqrt(stretch2), length(vec2(lobe.u.z, lobe.v.z)));
+}
+
+// Upper bound of the lobe's integral over an area [m^2] inside a disc (center, radius) about
+// the light's origin.
+float integral_bound(LobeBound bound, vec3 disc, float area)
+{
+    vec2 at = disc.xy - bound.lobe.anchor;
+    vec3 center = bound.lobe.center + at.x * bound.lobe.u + at.y * bound.lobe.v;
+    float top = center.z + disc.z * bound.rise;
+    float near = max(length(center) - disc.z * bound.stretch, bound.distance);
+    float near2 = near * near;
+    return top <= 0.0 ? 0.0 : area * bound.scale * top / (near2 * near2);
+}
+
+// A straight or curved part of the outline about the anchor, above the surface.
+struct ContourPart {
+    PlanarEdge edge;
+    PlanarCurve curve;
+    float from;
+    float to;
+    bool is_curve;
+};
+
+// The next part; false where there is none above the surface, or only further down the tree.
+bool contour_part(
+    PlanarLight light, CosineLight anchored, LobeBound bound, inout Contour contour,
+    out ContourPart part)
+{
+    part.is_curve = false;
+    if (contour.closing) {
+        part.edge = closing_edge(contour);
+        return true;
+    }
+    int texel = light.first_part + 4 * contour.next;
+    vec4 about = light_texel(texel + 2);
+    vec4 inside = light_texel(texel + 3);
+    bool is_inner = about.w < 0.0;
+    int after = is_inner ? int(inside.x) : contour.next + 1;
+    vec2 at = about.xy - anchored.anchor;
+    float steepness = length(contour.slope);
+    float highest = height_of(contour, at) + about.z * steepness;
+    // Safely below: ends that are shared with other nodes must not be judged differently.
+    float margin = 1e-5 * (abs(contour.base) + steepness * (length(at) + about.z));
+    if (highest < -margin) {
+        contour.next = after;
+        return false;
+    }
+    bool is_chord = integral_bound(bound, about.xyz, abs(about.w)) <= CHORD_ERROR;
+    if (is_inner && !is_chord) {
+        ++contour.next;
+        return false;
+    }
+    vec4 ends = light_texel(texel);
+    vec4 ends_low = light_texel(texel + 1);
+    part.edge = planar_edge(ends, ends_low, anchored.anchor, anchored.anchor_low);
+    if (is_chord) {
+        contour.next = after;
+        return clip_edge(contour, part.edge);
+    }
+    part.is_curve = true;
+    part.curve = PlanarCurve(part.edge.a, part.edge.d, inside.xy, inside.zw);
+    vec4 z = vec4(height_of(contour, part.edge.a),
+                  height_of(contour, part.edge.a + inside.xy),
+                  height_of(contour, part.edge.b + inside.zw),
+                  height_of(contour, part.edge.b));
+    part.from = contour.from;
+    bool above = contour.from > 0.0 ? contour.above : z.x > 0.0;
+    part.to = next_crossing(z, part.from, 1.0, above);
+    if (part.to < 1.0) {
+        meet_horizon(contour, curve_point(power_curve(part.curve), part.to), above);
+        contour.from = part.to;
+        contour.above = !above;
+    } else {
+        contour.from = 0.0;
+        contour.next = after;
+    }
+    return above;
+}
+
+// Form factor, under the transform, of the part of a light above the surface.
+float light_form_factor(
+    PlanarLight light, CosineTransform transform, PlaneView view, vec3 normal)
+{
+    CosineLight transformed = cosine_light(transform, light, view);
+    LobeBound bound = lobe_bound(transformed);
+    Contour contour = contour_start(light, view, transformed, normal);
+    ContourSum sum = ContourSum(0.0, 0.0, 0.0);
+    while (!contour_ends(light, contour)) {
+        ContourPart part;
+        if (contour_part(light, transformed, bound, contour, part)) {
+            if (part.is_curve) {
+                add_curve(transformed, part.curve, part.from, part.to, sum);
+            } else {
+                add_edge(transformed, part.edge, sum);
+            }
+        }
+    }
+    return form_factor(transformed, sum);
+}
+
+#endif
 
 // Whether a point at this depth sees a light's dark side, or only its edge.
 bool shows_nothing(PlanarLight light, float depth)

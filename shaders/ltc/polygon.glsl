@@ -161,9 +161,11 @@ PlanarEdge planar_edge(vec4 corners, vec4 corners_low, vec2 anchor, vec2 anchor_
 {
     PlanarEdge edge;
     vec2 a_low;
+    vec2 b_low;
     vec2 d_low;
+    // Both ends alike: a vertex is one edge's end and the next one's start, to the bit.
     edge.a = accurate_difference(corners.xy, corners_low.xy, anchor, anchor_low, a_low);
-    edge.b = (corners.zw - anchor) + (corners_low.zw - anchor_low);
+    edge.b = accurate_difference(corners.zw, corners_low.zw, anchor, anchor_low, b_low);
     edge.d = accurate_difference(corners.zw, corners_low.zw, corners.xy, corners_low.xy, d_low);
     edge.moment = cross_2d(edge.a, edge.d) +
                   ((a_low.x * edge.d.y - a_low.y * edge.d.x) +

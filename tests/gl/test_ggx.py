@@ -71,6 +71,7 @@ FEATURES = {
     "HAS_DIFFUSE": 1,
     "HAS_ONE_SIDED": 1,
     "HAS_TWO_SIDED": 1,
+    "HAS_CURVES": 0,
     "HAS_EXACT_FMA": 0,
     "PROBES": 1,
     "GGX_NODES": 2,

@@ -10,7 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from app.render.features import LightNeeds, Limits
-from app.render.pack import LIGHT_HEADER, light_geometry, pack_lights, pack_materials
+from app.render.pack import (
+    LIGHT_HEADER,
+    edges_of,
+    light_geometry,
+    pack_lights,
+    pack_materials,
+)
 from app.render.programs import Programs, ProgramSpec, shader_roots
 from app.render.state import FullScreenTriangle, begin_pass, release_framebuffer
 from app.render.storage import TexelStorage
@@ -79,10 +85,10 @@ vec4 echo(int row, int column)
 {
     PlanarLight light = light_at(row);
     if (column == 0) { return vec4(light.origin, light.radius); }
-    if (column == 1) { return vec4(light.u, float(light.edge_count)); }
-    if (column == 2) { return vec4(light.v, float(light.first_edge)); }
+    if (column == 1) { return vec4(light.u, float(light.part_count)); }
+    if (column == 2) { return vec4(light.v, float(light.first_part)); }
     if (column == 3) { return vec4(light.radiance, light.two_sided ? 1.0 : 0.0); }
-    if (column == 4) { return light_texel(light.first_edge); }
+    if (column == 4) { return light_texel(light.first_part); }
     return vec4(0.0);
 }
 """
@@ -96,10 +102,10 @@ vec4 echo(int row, int column)
         assert got[i, 0, 3] == pytest.approx(geometry.radius, rel=1e-6)
         np.testing.assert_allclose(got[i, 1, :3], u / np.linalg.norm(u), atol=1e-7)
         np.testing.assert_allclose(np.cross(got[i, 1, :3], got[i, 2, :3]), normal, atol=1e-6)
-        assert got[i, 1, 3] == len(geometry.edges) == (8 if i % 2 else 4)
+        assert got[i, 1, 3] == geometry.parts == (8 if i % 2 else 4)
         assert got[i, 2, 3] >= len(LIGHTS) * LIGHT_HEADER.itemsize // 16
         np.testing.assert_array_equal(got[i, 3], [*light.radiance, float(light.two_sided)])
-        np.testing.assert_allclose(got[i, 4], geometry.edges[0], rtol=1e-6)
+        np.testing.assert_allclose(got[i, 4], edges_of(geometry.loops)[0], rtol=1e-6)
         # The outline's first corner in the world, from the packed numbers alone.
         corner = got[i, 0, :3] + got[i, 4, 0] * got[i, 1, :3] + got[i, 4, 1] * got[i, 2, :3]
         on_plane = np.linalg.solve(np.stack([u, v, normal], axis=1), corner - light.plane.origin)

@@ -23,6 +23,7 @@ FEATURES = {
     "HAS_DIFFUSE": 1,
     "HAS_ONE_SIDED": 1,
     "HAS_TWO_SIDED": 1,
+    "HAS_CURVES": 0,
     "HAS_EXACT_FMA": 0,
     "PROBES": 1,
 }
@@ -258,7 +259,7 @@ def test_light_header_and_plane_view(glsl):
     for name, vector in (("origin", origin), ("u", u), ("v", v), ("n", n)):
         header[name] = vector
         header[f"{name}_low"] = vector - header[name].astype(np.float64)
-    header["radius"], header["edge_count"], header["first_edge"] = 2.0, 5.0, 8.0
+    header["radius"], header["part_count"], header["first_part"] = 2.0, 5.0, 8.0
     texels = np.array([header]).view(np.float32).reshape(-1, 4)
     prelude = (
         "vec4 light_texel(int index) { const vec4 t[8] = vec4[]("
