@@ -377,27 +377,19 @@ def remove(contour: Contour, index: int) -> Contour | None:
     count = len(curves)
     if count <= 2:
         return None
-    # With the point at the end, the two segments that meet there are the last and the first.
-    turn = index
-    curves = np.roll(curves, -turn, axis=0)
-    straight = np.roll(straight, -turn)
-    turned = [kinds[(i + turn) % count] for i in range(count)]
-    before, after = curves[-1], curves[0]
-    if straight[-1] and straight[0]:
-        merged = line_as_cubic(before[0], after[3])
+    before = (index - 1) % count
+    if straight[before] and straight[index]:
+        merged = line_as_cubic(curves[before, 0], curves[index, 3])
     else:
-        merged = _merged(before, after)
-    rest_curves = np.concatenate([curves[1:-1], merged[None]])
-    rest_kinds = turned[1:]
-    if len(rest_curves) < 3 and is_straight(rest_curves).all():
+        merged = _merged(curves[before], curves[index])
+    curves[before] = merged
+    kept = [i for i in range(count) if i != index]
+    curves = curves[kept]
+    if len(curves) < 3 and is_straight(curves).all():
         return None
-    # Back to the order it had: the point that was first stays first if it is still there.
-    back = -(turn - 1) % (count - 1) if turn else 0
-    rest_curves = np.roll(rest_curves, -back, axis=0)
-    rest_kinds = [rest_kinds[(i + back) % (count - 1)] for i in range(count - 1)]
-    place = (index - 1) % (count - 1)
-    ends = (place, (place + 1) % (count - 1))
-    return _chain(rest_curves, _weakened(rest_curves, rest_kinds, ends))
+    place = kept.index(before)
+    ends = (place, (place + 1) % len(kept))
+    return _chain(curves, _weakened(curves, [kinds[i] for i in kept], ends))
 
 
 # Segments

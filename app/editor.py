@@ -83,12 +83,12 @@ def duplicate_selected(scene: Scene, selection: Selection) -> tuple[Scene, Selec
 
 
 def remove_selected(scene: Scene, selection: Selection) -> tuple[Scene, Selection]:
-    """Remove the selected corner, light or object.
+    """Remove the selected corner or anchor, light or object.
 
     Raises
     ------
     SceneError
-        If a light would keep fewer than three corners.
+        If nothing with an inside would remain of a light.
     """
     if selection.kind == "object":
         return edits.remove_object(scene, selection.index), NOTHING
@@ -216,18 +216,19 @@ class Editor:
         self._apply_to_selected(step_names.describe(self._scene, scene), scene, selection)
 
     def remove(self) -> None:
-        """Remove the selected corner, light or object, as one step.
+        """Remove the selected corner or anchor, light or object, as one step.
 
         Raises
         ------
         SceneError
-            If a light would keep fewer than three corners.
+            If nothing with an inside would remain of a light.
         """
         scene, selection = remove_selected(self._scene, self._selection)
         name = step_names.describe(self._scene, scene)
         light = self.selected_light
         if light is not None and self._selection.vertex is not None:
-            name = f"Remove corner of '{light.name}'"
+            contour = light.outline.contours[self._selection.vertex[0]]
+            name = f"Remove {lights.word_for_vertex(contour)} of '{light.name}'"
         self._apply_to_selected(name, scene, selection)
 
     def escape(self) -> None:
