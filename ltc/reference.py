@@ -25,8 +25,7 @@ Lights have radiance 1; loops count positive counter-clockwise about +z, like
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -34,7 +33,7 @@ import numpy.typing as npt
 
 from ltc import brdf
 from ltc.polygon import clip_to_horizon
-from ltc.quadrature import gauss_legendre
+from ltc.quadrature import gauss_legendre, halve, legendre_matrix, panels, tail
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.intp]
@@ -417,10 +416,10 @@ def _core(
             ready &= _smith_pole(np.column_stack([o[:, :2], z]), slope, wo[i], L[i], half, t)
         return ready
 
-    legendre = _legendre(nodes)
+    legendre = legendre_matrix(nodes)
     x, w = gauss_legendre(nodes)
     centre: FloatArray | None = None
-    e, lo, hi = _panels(sweep, edge_ready)
+    e, lo, hi = panels(sweep, edge_ready)
     for last in range(_MAX_SPLITS, -1, -1):
         phi = (lo[:, None] + (hi - lo)[:, None] * x).ravel()
         w_phi = ((hi - lo)[:, None] * w).ravel()
@@ -435,7 +434,7 @@ def _core(
         k = w_phi * _dot(centre[i], np.cross(h, dh)) / h2
         values, inner_error = _chords(centre[i], u, k, wo[i], L[i], nodes, tolerance)
         values = values.reshape(2, -1, nodes)
-        outer_error = _tail(values[0] / w, legendre)
+        outer_error = tail(values[0] / w, legendre)
         bad = outer_error > (tolerance if last else np.inf)
         total = np.sum(np.where(bad[:, None], 0.0, values), axis=-1)
         error = outer_error + np.sum(inner_error.reshape(-1, nodes), axis=-1)
@@ -443,7 +442,7 @@ def _core(
             row += np.bincount(which[e], part, n)
         if not np.any(bad):
             break
-        e, lo, hi = _halve(e[bad], lo[bad], hi[bad])
+        e, lo, hi = halve(e[bad], lo[bad], hi[bad])
     return result
 
 
@@ -475,9 +474,9 @@ def _chords(
         return ok
 
     x, w = gauss_legendre(nodes)
-    legendre = _legendre(nodes)
+    legendre = legendre_matrix(nodes)
     sums, errors = np.zeros((2, k.size)), np.zeros(k.size)
-    f, lo, hi = _panels(np.ones(k.shape), ready)
+    f, lo, hi = panels(np.ones(k.shape), ready)
     for last in range(_MAX_SPLITS, -1, -1):
         bad = np.zeros(f.shape, dtype=np.bool_)
         for start in range(0, f.size, 4096):
@@ -495,7 +494,7 @@ def _chords(
                 stretch[j, 1, None],
             )
             density *= (k[j] * width)[:, None] * s
-            error = _tail(density, legendre)
+            error = tail(density, legendre)
             bad[part] = error > (0.01 * tolerance if last else np.inf)
             good = ~bad[part]
             density *= w
@@ -505,55 +504,8 @@ def _chords(
             errors += np.bincount(j[good], error[good], k.size)
         if not np.any(bad):
             break
-        f, lo, hi = _halve(f[bad], lo[bad], hi[bad])
+        f, lo, hi = halve(f[bad], lo[bad], hi[bad])
     return sums, errors
-
-
-@lru_cache(maxsize=16)
-def _legendre(nodes: int) -> FloatArray:
-    """Return the matrix that takes values at Gauss nodes to Legendre coefficients."""
-    x, w = np.polynomial.legendre.leggauss(nodes)
-    degrees = np.arange(nodes)
-    return np.polynomial.legendre.legvander(x, nodes - 1) * w[:, None] * (degrees + 0.5)
-
-
-def _tail(values: FloatArray, legendre: FloatArray) -> FloatArray:
-    """Return an estimate of Gauss quadrature's error on panels of length 1, (m).
-
-    Coefficients c_k that fall geometrically to r c_0 at k = n leave an error of r^2 c_0,
-    since the rule is exact to degree 2n - 1.
-    """
-    coefficients = np.abs(values @ legendre)
-    largest = np.max(coefficients, axis=-1)
-    end = np.maximum(coefficients[:, -1], coefficients[:, -2])
-    ratio = end / np.where(largest > 0.0, largest, 1.0)
-    return np.asarray(ratio * np.maximum(ratio, 1e-12) * largest)
-
-
-def _halve(
-    item: IntArray, lo: FloatArray, hi: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    m = 0.5 * (lo + hi)
-    return np.concatenate([item, item]), np.concatenate([lo, m]), np.concatenate([m, hi])
-
-
-def _panels(
-    end: FloatArray, ready: Callable[[IntArray, FloatArray, FloatArray], BoolArray]
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return (item, low, high) of the panels that halving [0, end] makes ready."""
-    item = np.arange(end.size)
-    lo, hi = np.zeros_like(end), end
-    done: list[tuple[IntArray, FloatArray, FloatArray]] = []
-    while item.size:
-        m, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
-        ok = ready(item, m, half) | (half < 1e-13)
-        done.append((item[ok], lo[ok], hi[ok]))
-        item, lo, hi = _halve(item[~ok], lo[~ok], hi[~ok])
-    return (
-        np.concatenate([panel[0] for panel in done]),
-        np.concatenate([panel[1] for panel in done]),
-        np.concatenate([panel[2] for panel in done]),
-    )
 
 
 def _centres(

@@ -1,0 +1,795 @@
+"""Outlines of cubic Bézier curves seen from the origin: clip to the horizon, form factor.
+
+A light is one or more closed contours in a common plane, holes wound against the outer
+contours, as in `ltc.polygon`; a contour is a (..., k, 4, 3) array of cubics, each
+ending where the next begins. Straight edges and quadratics are raised to cubics, exactly.
+Everything here is a sum over directed curves: contours are not joined and their order
+does not matter. Counter-clockwise about +z is positive.
+
+The contour integral. For a region on the unit sphere with the boundary o,
+Stokes gives the clamped-cosine integral  E = 1/(2 pi) int (o x do)_z: half the
+boundary's moment. With o = r/|r|, the part of dr along r drops out of the cross product, so
+
+    E = 1/(2 pi) int (x y' - y x') / |r|^2 dt
+
+over any parametrisation of the outline r(t). Lambert's edge term is this integral over a
+straight segment. For a cubic it is a rational function, degree 4 over degree 6.
+
+The horizon. The region above z = 0 is bounded by the outline's parts above and by
+segments of the line where the light's plane meets z = 0. There |r|^2 = x^2 + y^2 and the
+form is the differential of the azimuth phi, so a segment adds its azimuth / (2 pi). Written
+per crossing k of an outline with z = 0, this is +phi_k/(2 pi) where it rises and -phi_k/(2 pi)
+where it sinks: each crossing by itself, no entry and exit to be matched. All crossings lie
+on one line, so azimuths measured from its normal never wrap. `clip` forms
+the segments themselves: sorted along the line, the count of sinking less rising
+crossings up to a place is how often the boundary runs through it.
+
+The same without crossings. Below the horizon replace o by its azimuth, (x, y)/|(x, y)|:
+
+    E = 1/(2 pi) int (x y' - y x') / (x^2 + y^2 + max(z, 0)^2) dt  -  w,
+
+since the azimuth along the outline below and along the line differ by whole turns: w is
+the number of times that the light covers the nadir.
+
+The closed form. In s = 2t - 1 let N = x y' - y x' and D = |r|^2, with the complex roots s_k.
+Partial fractions give N/D = sum c_k / (s - s_k), c_k = N(s_k)/D'(s_k), and each
+integrates to c_k log((1 - s_k)/(-1 - s_k)). Roots come in conjugate pairs, so it is twice
+the real part over those with Im s_k > 0, whose 1 - s_k and -1 - s_k both lie below the real
+axis: the principal logarithm is the right one. The leading coefficients of D vanish for
+lines and raised quadratics, its constant |r(middle)|^2 does not; so w_k = 1/s_k are taken,
+roots of the reversed polynomial, and a missing root is w_k = 0, which adds nothing:
+c_k = -N~(w_k)/D~'(w_k), logarithm log((1 - w_k)/(1 + w_k)), Im w_k < 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from ltc import transform
+from ltc.quadrature import gauss_legendre, halve, legendre_matrix, panels, tail
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.intp]
+BoolArray: TypeAlias = npt.NDArray[np.bool_]
+
+CLOSURE = 1e-9
+"""Largest gap between a curve's end and the next one's start, in parts of the coordinates."""
+
+
+# --- Primitives ---------------------------------------------------------------------------
+
+
+def _curves(curves: npt.ArrayLike) -> FloatArray:
+    p = np.asarray(curves, dtype=np.float64)
+    if p.ndim < 2 or p.shape[-2] != 4:
+        raise ValueError(f"curves have shape {p.shape}, expected (..., 4, d)")
+    return p
+
+
+def from_line(a: npt.ArrayLike, b: npt.ArrayLike) -> FloatArray:
+    """Return straight segments a -> b, (..., d) each, as cubics (..., 4, d), evenly run through."""
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    a, b = np.broadcast_arrays(a, b)
+    return np.stack([a, (2.0 * a + b) / 3.0, (a + 2.0 * b) / 3.0, b], axis=-2)
+
+
+def from_polygon(vertices: npt.ArrayLike) -> FloatArray:
+    """Return the edges of closed polygons (..., N, d) as a contour of cubics (..., N, 4, d)."""
+    p = np.asarray(vertices, dtype=np.float64)
+    return from_line(p, np.roll(p, -1, axis=-2))
+
+
+def from_quadratic(control: npt.ArrayLike) -> FloatArray:
+    """Return the same curves as cubics.
+
+    Parameters
+    ----------
+    control : (..., 3, d) float64
+        Control points of quadratic Béziers.
+
+    Returns
+    -------
+    (..., 4, d) float64
+        Their cubic control points: the inner ones are 2/3 of the way from an end to the
+        quadratic's middle point.
+
+    Raises
+    ------
+    ValueError
+        If the shape is not (..., 3, d).
+    """
+    q = np.asarray(control, dtype=np.float64)
+    if q.ndim < 2 or q.shape[-2] != 3:
+        raise ValueError(f"control has shape {q.shape}, expected (..., 3, d)")
+    a, m, b = q[..., 0, :], q[..., 1, :], q[..., 2, :]
+    return np.stack([a, (a + 2.0 * m) / 3.0, (2.0 * m + b) / 3.0, b], axis=-2)
+
+
+def _blend(p: FloatArray, t: FloatArray) -> FloatArray:
+    """Return one step of de Casteljau on (..., j, d) with t (...): (..., j - 1, d)."""
+    t = t[..., None, None]
+    return (1.0 - t) * p[..., :-1, :] + t * p[..., 1:, :]
+
+
+def evaluate(curves: npt.ArrayLike, t: npt.ArrayLike) -> FloatArray:
+    """Return points of curves by de Casteljau's steps, exact at t = 0 and 1.
+
+    Parameters
+    ----------
+    curves : (..., 4, d) float64
+        Control points.
+    t : (...) float64
+        Parameters, broadcast against the curves' leading axes.
+
+    Returns
+    -------
+    (..., d) float64
+
+    Raises
+    ------
+    ValueError
+        If the curves' shape is not (..., 4, d).
+    """
+    p, t = _curves(curves), np.asarray(t, dtype=np.float64)
+    return np.asarray(_blend(_blend(_blend(p, t), t), t)[..., 0, :])
+
+
+def derivative(curves: npt.ArrayLike, t: npt.ArrayLike) -> FloatArray:
+    """Return d/dt of curves: shapes as for `evaluate`."""
+    p, t = _curves(curves), np.asarray(t, dtype=np.float64)
+    return np.asarray(3.0 * _blend(_blend(np.diff(p, axis=-2), t), t)[..., 0, :])
+
+
+def split(curves: npt.ArrayLike, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the parts (..., 4, d) of curves before and after t (...), sharing their point at t."""
+    p, t = _curves(curves), np.asarray(t, dtype=np.float64)
+    a = _blend(p, t)
+    b = _blend(a, t)
+    c = _blend(b, t)
+    p = np.broadcast_to(p, (*c.shape[:-2], 4, c.shape[-1]))
+    before = np.stack([p[..., 0, :], a[..., 0, :], b[..., 0, :], c[..., 0, :]], axis=-2)
+    after = np.stack([c[..., 0, :], b[..., 1, :], a[..., 2, :], p[..., 3, :]], axis=-2)
+    return before, after
+
+
+def part(curves: npt.ArrayLike, lo: npt.ArrayLike, hi: npt.ArrayLike) -> FloatArray:
+    """Return the part of curves between the parameters lo and hi (...), as curves (..., 4, d).
+
+    Control points are the blossom at (lo, lo, lo), (lo, lo, hi), (lo, hi, hi), (hi, hi, hi):
+    no division, the curve itself for 0 and 1, a point for lo = hi.
+    """
+    p = _curves(curves)
+    lo, hi = np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64)
+    at_lo, at_hi = _blend(p, lo), _blend(p, hi)
+    ll, hh = _blend(at_lo, lo), _blend(at_hi, hi)
+    blossom = [_blend(ll, lo), _blend(ll, hi), _blend(hh, lo), _blend(hh, hi)]
+    return np.concatenate(np.broadcast_arrays(*blossom), axis=-2)
+
+
+def flatten(contour: npt.ArrayLike, steps: int) -> FloatArray:
+    """Return a polygon (..., k steps, d) inscribed in a contour (..., k, 4, d)."""
+    p = _curves(contour)
+    t = np.arange(steps) / steps
+    points = evaluate(p[..., None, :, :], t)
+    return points.reshape(*p.shape[:-3], -1, p.shape[-1])
+
+
+def positive_winding(contour: npt.ArrayLike) -> FloatArray:
+    """Return a light's contour (..., k, 4, 3) in the order that this module counts positive.
+
+    As `ltc.polygon.positive_winding`: scenes store outlines counter-clockwise seen from
+    the emitting side, which is clockwise about +z for a point that the light faces.
+    """
+    return _curves(contour)[..., ::-1, ::-1, :]
+
+
+def sign_changes(coefficients: npt.ArrayLike) -> tuple[FloatArray, IntArray]:
+    """Return where cubics pass between positive and not positive on [0, 1].
+
+    Parameters
+    ----------
+    coefficients : (..., 4) float64
+        Bernstein coefficients; lines and quadratics raised to cubics too.
+
+    Returns
+    -------
+    places : (..., 3) float64
+        Ascending parameters in [0, 1], filled up with 1.
+    count : (...) intp
+        How many of them are sign changes. It is odd exactly if one of
+        the first and last coefficient is positive and the other is not.
+
+    Raises
+    ------
+    ValueError
+        If the shape is not (..., 4).
+
+    Notes
+    -----
+    The derivative's roots, in Bernstein form and without dividing by a leading coefficient that
+    may vanish, cut [0, 1] into monotone parts; on each with a change of sign
+    Newton's method is kept within a bracket. Zero counts as not positive, and an end
+    that is exactly zero is returned exactly. Double roots are no sign changes.
+    """
+    b = np.asarray(coefficients, dtype=np.float64)
+    if b.ndim < 1 or b.shape[-1] != 4:
+        raise ValueError(f"coefficients have shape {b.shape}, expected (..., 4)")
+    shape = b.shape[:-1]
+    b = b.reshape(-1, 4)
+    # A power of two changes no sign and no digit, and keeps squares in range.
+    _, exponent = np.frexp(np.max(np.abs(b), axis=-1, initial=0.0))
+    with np.errstate(under="ignore"):
+        b = np.ldexp(b, -exponent[:, None])
+        places, changes = _monotone_roots(b)
+    count = np.sum(changes, axis=-1)
+    places = np.sort(np.where(changes, places, 1.0), axis=-1)
+    return places.reshape(*shape, 3), np.asarray(count.reshape(shape), dtype=np.intp)
+
+
+def _bernstein(b: FloatArray, t: FloatArray) -> FloatArray:
+    """Return cubics with coefficients (m, 4) at t (m, n), exactly b_0 and b_3 at the ends."""
+    s = 1.0 - t
+    b0, b1, b2, b3 = (b[:, j, None] for j in range(4))
+    p, q, r = s * b0 + t * b1, s * b1 + t * b2, s * b2 + t * b3
+    return s * (s * p + t * q) + t * (s * q + t * r)
+
+
+def _monotone_roots(b: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return (m, 3): a place on each monotone part of cubics (m, 4), and whether it is a root."""
+    d = np.diff(b, axis=-1)
+    # d_0 (1-t)^2 + 2 d_1 t (1-t) + d_2 t^2 = a t^2 + 2 h t + d_0
+    a, h, c = d[:, 0] - 2.0 * d[:, 1] + d[:, 2], d[:, 1] - d[:, 0], d[:, 0]
+    q = -(h + np.copysign(np.sqrt(np.maximum(d[:, 1] ** 2 - d[:, 0] * d[:, 2], 0.0)), h))
+    turns = []
+    for over, under in ((q, a), (c, q)):
+        inside = (np.abs(over) < np.abs(under)) & (over * np.sign(under) > 0.0)
+        turns.append(np.where(inside, over / np.where(inside, under, 1.0), 1.0))
+    low, high = np.minimum(*turns), np.maximum(*turns)
+    zero, one = np.zeros_like(low), np.ones_like(low)
+    lo, hi = np.stack([zero, low, high], axis=-1), np.stack([low, high, one], axis=-1)
+    f_lo, f_hi = _bernstein(b, lo), _bernstein(b, hi)
+    rising = f_hi > 0.0
+    changes = (f_lo > 0.0) != rising
+    # An end that is zero is the root.
+    hi = np.where(changes & (f_lo == 0.0), lo, hi)
+    lo = np.where(changes & (f_hi == 0.0), hi, lo)
+    lo, hi = np.where(changes, lo, 1.0), np.where(changes, hi, 1.0)
+    t = 0.5 * (lo + hi)
+    for step in range(130):  # every other step halves the bracket, so 2 x 64 always suffice
+        f = _bernstein(b, t)
+        beyond = (f > 0.0) == rising
+        lo, hi = np.where(beyond, lo, t), np.where(beyond, t, hi)
+        if np.all((hi - lo <= 2e-16 * hi) | (f == 0.0)):
+            break
+        s = 1.0 - t
+        d0, d1, d2 = (d[:, j, None] for j in range(3))
+        slope = 3.0 * (s * (s * d0 + t * d1) + t * (s * d1 + t * d2))
+        flat = np.abs(slope) <= np.abs(f)
+        newton = t - np.where(flat, 0.0, f) / np.where(flat, 1.0, slope)
+        # A little past the root, so that the other end of the bracket follows.
+        newton += np.copysign(4e-16, newton - t)
+        good = (newton > lo) & (newton < hi) & ~flat & (step % 2 == 0)
+        t = np.where(f == 0.0, t, np.where(good, newton, 0.5 * (lo + hi)))
+    return t, changes
+
+
+# --- Ragged lists of curves ---------------------------------------------------------------
+
+
+class Region(NamedTuple):
+    """What bounds the parts of several lights above z = 0, as one list."""
+
+    curves: FloatArray
+    """(m, 4, 3): the outlines' parts above."""
+    light: IntArray
+    """(m): which light each belongs to."""
+    segments: FloatArray
+    """(l, 2, 3): segments of the horizon that close them, z = 0."""
+    segment_light: IntArray
+    """(l)."""
+    times: FloatArray
+    """(l): how often the boundary runs along each segment, negative for backwards."""
+
+
+def _flat(
+    contours: Sequence[npt.ArrayLike],
+) -> tuple[FloatArray, IntArray, tuple[int, ...]]:
+    """Return all curves (m, 4, 3), the light of each (m), and the shape of the lights.
+
+    Each end is replaced by the next start, so that both have the same bits: whether
+    they are above the horizon must not depend on rounding.
+    """
+    arrays = []
+    for k, contour in enumerate(contours):
+        p = np.asarray(contour, dtype=np.float64)
+        if p.ndim < 3 or p.shape[-2:] != (4, 3):
+            raise ValueError(f"contour {k} has shape {p.shape}, expected (..., k, 4, 3)")
+        following = np.roll(p[..., 0, :], -1, axis=-2)
+        gap = np.max(np.abs(p[..., 3, :] - following), initial=0.0)
+        if gap > CLOSURE * np.max(np.abs(p), initial=0.0):
+            raise ValueError(
+                f"contour {k} has a gap of {gap:g}, expected each curve to end "
+                "where the next one begins"
+            )
+        p = p.copy()
+        p[..., 3, :] = following
+        arrays.append(p)
+    shape = np.broadcast_shapes(*(p.shape[:-3] for p in arrays)) if arrays else ()
+    n = int(np.prod(shape))
+    flat = [np.broadcast_to(p, (*shape, *p.shape[-3:])).reshape(n, -1, 4, 3) for p in arrays]
+    joined = np.concatenate(flat, axis=1) if flat else np.zeros((n, 0, 4, 3))
+    return joined.reshape(-1, 4, 3), np.repeat(np.arange(n), joined.shape[1]), shape
+
+
+def _clip(curves: FloatArray, light: IntArray) -> Region:
+    """Return what bounds the parts above z = 0 of closed outlines (m, 4, 3) in planes."""
+    m = curves.shape[0]
+    places, count = sign_changes(curves[:, :, 2])
+    bounds = np.concatenate([np.zeros((m, 1)), places, np.ones((m, 1))], axis=-1)
+    starts_above = curves[:, 0, 2] > 0.0
+    crossing = evaluate(curves[:, None], places)
+    crossing[..., 2] = 0.0
+    parts, owners = [], []
+    for j in range(4):
+        # The sign alternates, so that a part as short as nothing is still counted.
+        above = (starts_above != (j % 2 == 1)) & (j <= count)
+        piece = part(curves[above], bounds[above, j], bounds[above, j + 1])
+        if j > 0:
+            piece[:, 0] = crossing[above, j - 1]
+        if j < 3:
+            ends = (j < count)[above]
+            piece[ends, 3] = crossing[above, j][ends]
+        parts.append(piece)
+        owners.append(light[above])
+    found = np.arange(3) < count[:, None]
+    sinks = starts_above[:, None] != (np.arange(3) % 2 == 1)
+    segments, owner, times = _horizon_segments(
+        crossing[found],
+        np.broadcast_to(light[:, None], (m, 3))[found],
+        np.where(sinks, 1.0, -1.0)[found],
+    )
+    return Region(np.concatenate(parts), np.concatenate(owners), segments, owner, times)
+
+
+def _horizon_segments(
+    points: FloatArray, light: IntArray, flow: FloatArray
+) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Return (segments (l, 2, 3), their light, how often each is run through).
+
+    ``points`` (c, 3) are crossings, ``flow`` is 1 where an outline sinks, so that the boundary
+    goes on along the horizon, and -1 where it rises. Those of one light are on one line.
+    """
+    n = int(np.max(light, initial=-1)) + 1
+    first, last = np.zeros((n, 3)), np.zeros((n, 3))
+    first[light] = points
+    offset = points - first[light]
+    order = np.argsort(np.sum(offset * offset, axis=-1))
+    last[light[order]] = points[order]  # the farthest from ``first`` is written last
+    along = np.sum(offset * (last - first)[light], axis=-1)
+    order = np.lexsort((along, light))
+    points, light, flow = points[order], light[order], np.cumsum(flow[order])
+    # The flow of a light sums to nothing, so none runs over to the next light.
+    used = np.flatnonzero(flow[:-1])
+    segments = np.stack([points[used], points[used + 1]], axis=-2)
+    return segments, light[used], flow[used]
+
+
+def _azimuths(region: Region, n: int) -> FloatArray:
+    """Return the lights' sums (n) of azimuths [rad] along the horizon."""
+    a, b = region.segments[:, 0], region.segments[:, 1]
+    d = b - a
+    turn = np.arctan2(a[:, 0] * d[:, 1] - a[:, 1] * d[:, 0], a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])
+    # Through the very origin: on neither side, as in `ltc.polygon`.
+    turn = np.where(np.abs(turn) == np.pi, 0.0, turn)
+    return _sums(region.segment_light, region.times * turn, n)
+
+
+def _closed_curves(region: Region) -> tuple[FloatArray, IntArray]:
+    """Return a region's whole boundary as closed curves (m, 4, 3) and their lights (m)."""
+    a, b = region.segments[:, 0], region.segments[:, 1]
+    backwards = (region.times < 0.0)[:, None]
+    lines = from_line(np.where(backwards, b, a), np.where(backwards, a, b))
+    times = np.abs(region.times).astype(np.intp)
+    return (
+        np.concatenate([region.curves, np.repeat(lines, times, axis=0)]),
+        np.concatenate([region.light, np.repeat(region.segment_light, times)]),
+    )
+
+
+def _sums(item: IntArray, values: npt.ArrayLike, n: int) -> FloatArray:
+    """Return the sums (n) of the values of each item."""
+    return np.asarray(np.bincount(item, values, n), dtype=np.float64)
+
+
+# --- The integral over a curve, three ways ------------------------------------------------
+
+
+def _moment(r: FloatArray, dr: FloatArray) -> FloatArray:
+    return np.asarray(r[..., 0] * dr[..., 1] - r[..., 1] * dr[..., 0])
+
+
+def _square(r: FloatArray) -> FloatArray:
+    return np.asarray(r[..., 0] ** 2 + r[..., 1] ** 2 + r[..., 2] ** 2)
+
+
+def _quotient(over: FloatArray, under: FloatArray) -> FloatArray:
+    """Return over/under, 0 where under is 0."""
+    out = np.zeros(under.shape)
+    np.divide(over, under, out=out, where=under > 0.0)
+    return out
+
+
+def _speed(curves: FloatArray) -> FloatArray:
+    """Return an upper bound (m) of |r'|."""
+    legs = np.diff(curves, axis=-2)
+    return np.asarray(3.0 * np.sqrt(np.max(_square(legs), axis=-1)))
+
+
+_NODES = 16
+_MAX_SPLITS = 40
+
+
+def _integrate(
+    integrand: Callable[[IntArray, FloatArray], FloatArray],
+    panel: tuple[IntArray, FloatArray, FloatArray],
+    m: int,
+    tolerance: float,
+    analytic: bool = True,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the integrals (m) of items over their panels and error estimates (m).
+
+    ``integrand`` takes items (p) and parameters (p, nodes). Panels are halved
+    until the Legendre coefficients of the values promise the tolerance: their tail, or
+    the last of them where the integrand has kinks.
+    """
+    legendre = legendre_matrix(_NODES)
+    x, w = gauss_legendre(_NODES)
+    total, errors = np.zeros(m), np.zeros(m)
+    item, lo, hi = panel
+    for last in range(_MAX_SPLITS, -1, -1):
+        again = []
+        for start in range(0, item.size, 8192):
+            chunk = slice(start, start + 8192)
+            i, low, width = item[chunk], lo[chunk], (hi - lo)[chunk]
+            values = integrand(i, low[:, None] + width[:, None] * x) * width[:, None]
+            if analytic:
+                error = tail(values, legendre)
+            else:
+                error = np.max(np.abs(values @ legendre)[:, -4:], axis=-1)
+            bad = error > (tolerance if last else np.inf)
+            total += _sums(i, np.where(bad, 0.0, values @ w), m)
+            errors += _sums(i, np.where(bad, 0.0, error), m)
+            again.append(bad)
+        if not again or not np.any(bad := np.concatenate(again)):
+            break
+        item, lo, hi = halve(item[bad], lo[bad], hi[bad])
+    return total, errors
+
+
+def _by_quadrature(curves: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
+    """Return (integrals of the form (m), error estimates (m)) of curves (m, 4, 3)."""
+    speed = _speed(curves)
+
+    def short(i: IntArray, m: FloatArray, half: FloatArray) -> BoolArray:
+        # Within half its distance from the origin a panel has no pole near.
+        return np.asarray((speed[i] * half) ** 2 <= 0.25 * _square(evaluate(curves[i], m)))
+
+    def form(i: IntArray, t: FloatArray) -> FloatArray:
+        c = curves[i, None]
+        r = evaluate(c, t)
+        return _quotient(_moment(r, derivative(c, t)), _square(r))
+
+    panel = panels(np.ones(curves.shape[0]), short)
+    return _integrate(form, panel, curves.shape[0], tolerance)
+
+
+def _by_roots(curves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (integrals (m), error estimates (m)) by the closed form."""
+    size = np.max(np.abs(curves), axis=(-2, -1), initial=0.0)
+    p = curves / np.where(size > 0.0, size, 1.0)[:, None, None]
+    p0, p1, p2, p3 = (p[:, j] for j in range(4))
+    c = [
+        (p0 + 3.0 * p1 + 3.0 * p2 + p3) / 8.0,
+        3.0 * (p3 + p2 - p1 - p0) / 8.0,
+        3.0 * (p0 - p1 - p2 + p3) / 8.0,
+        (p3 - 3.0 * p2 + 3.0 * p1 - p0) / 8.0,
+    ]
+    m = curves.shape[0]
+    N, D = np.zeros((m, 5)), np.zeros((m, 7))
+    for i in range(4):
+        for j in range(4):
+            D[:, i + j] += np.sum(c[i] * c[j], axis=-1)
+            if i < j:
+                N[:, i + j - 1] += (j - i) * _moment(c[i], c[j])
+    value, error = np.zeros(m), np.zeros(m)
+    keep = D[:, 0] > 0.0  # else the middle is the origin: the form is odd about it
+    N, D = N[keep], D[keep]
+    companion = np.zeros((N.shape[0], 6, 6))
+    companion[:, 0] = -D[:, 1:] / D[:, :1]
+    companion[:, np.arange(1, 6), np.arange(5)] = 1.0
+    w = np.linalg.eigvals(companion).astype(np.complex128)
+    w = np.take_along_axis(w, np.argsort(w.imag, axis=-1), axis=-1)
+    gap = w[:, :3, None] - w[:, None, :]
+    gap[:, np.arange(3), np.arange(3)] = 1.0
+    w = w[:, :3]
+    slope = D[:, :1] * np.prod(gap, axis=-1)
+    top = N[:, :1] * w**4 + N[:, 1:2] * w**3 + N[:, 2:3] * w**2 + N[:, 3:4] * w + N[:, 4:]
+    regular = (slope != 0.0) & (w * w != 1.0)
+    residue = np.where(regular, -top / np.where(regular, slope, 1.0), 0.0)
+    term = residue * np.log(np.where(regular, (1.0 - w) / (1.0 + w), 1.0))
+    value[keep] = 2.0 * np.sum(term.real, axis=-1)
+    # Roots are off by rounding times their condition, which a small gap magnifies.
+    powers = np.abs(w[..., None]) ** np.arange(6, -1, -1)
+    off = np.sum(np.abs(D)[:, None, :] * powers, axis=-1) / np.where(regular, np.abs(slope), 1.0)
+    spread = np.sum(1.0 / np.maximum(np.abs(gap), 1e-30), axis=-1)
+    error[keep] = 1e-15 * np.sum(np.abs(term) * (1.0 + off * spread), axis=-1)
+    return value, error
+
+
+# --- Form factors -------------------------------------------------------------------------
+
+
+class Estimate(NamedTuple):
+    """Form factors and estimates of their absolute errors."""
+
+    value: FloatArray
+    error: FloatArray
+
+
+def _estimate(sums: FloatArray, errors: FloatArray, shape: tuple[int, ...]) -> Estimate:
+    turn = 2.0 * np.pi
+    value, error = np.asarray(sums / turn), np.asarray((errors + 1e-15) / turn)
+    return Estimate(value.reshape(shape), error.reshape(shape))
+
+
+def _per_light(
+    curves: FloatArray,
+    light: IntArray,
+    shape: tuple[int, ...],
+    integral: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
+) -> Estimate:
+    n = int(np.prod(shape))
+    region = _clip(curves, light)
+    value, error = integral(region.curves)
+    sums = _sums(region.light, value, n) + _azimuths(region, n)
+    return _estimate(sums, _sums(region.light, error, n), shape)
+
+
+def form_factor(contours: Sequence[npt.ArrayLike], tolerance: float = 1e-13) -> Estimate:
+    """Return the form factors of lights with curved outlines, seen from the origin.
+
+    Parameters
+    ----------
+    contours : sequence of (..., k, 4, 3) float64
+        Closed contours of cubics in the shading frame, those of one light in one
+        plane, anywhere about the horizon; each curve ends where the next begins. Holes are
+        wound against the outer contours. Leading axes broadcast.
+    tolerance : float
+        Estimated error above which a panel is halved.
+
+    Returns
+    -------
+    Estimate
+        value (...), in [0, 1] for outlines that run once counter-clockwise about +z,
+        negative for the other winding, exactly 0 where nothing is above the horizon; and an
+        estimate of its absolute error.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit or a contour has gaps.
+
+    Notes
+    -----
+    Quadrature: panels are halved while they are longer than their distance from the origin, so
+    that no peak can lie between the nodes, and then where 16 nodes did not do.
+    A point in the light's plane is on neither side of it.
+    """
+    curves, light, shape = _flat(contours)
+    return _per_light(curves, light, shape, lambda c: _by_quadrature(c, tolerance))
+
+
+def closed_form_factor(contours: Sequence[npt.ArrayLike]) -> Estimate:
+    """Return `form_factor` by the six complex roots of |r|^2 a curve.
+
+    Its error grows where two roots nearly meet; ``error`` says so.
+    """
+    curves, light, shape = _flat(contours)
+    return _per_light(curves, light, shape, _by_roots)
+
+
+def azimuth_form_factor(contours: Sequence[npt.ArrayLike], tolerance: float = 1e-12) -> Estimate:
+    """Return `form_factor` from whole contours, without crossings: the form with max(z, 0).
+
+    Slower, and for tests: it has no roots of z and no horizon in common with the others.
+    """
+    curves, light, shape = _flat(contours)
+    n, m = int(np.prod(shape)), curves.shape[0]
+    speed = _speed(curves)
+
+    def square(r: FloatArray) -> FloatArray:
+        return np.asarray(r[..., 0] ** 2 + r[..., 1] ** 2 + np.maximum(r[..., 2], 0.0) ** 2)
+
+    def short(i: IntArray, t: FloatArray, half: FloatArray) -> BoolArray:
+        # The second derivative jumps where z changes sign, so such panels must be tiny.
+        before, after = (evaluate(curves[i], t + side * half)[:, 2] > 0.0 for side in (-1.0, 1.0))
+        near = (speed[i] * half) ** 2 > 0.25 * square(evaluate(curves[i], t))
+        return np.asarray(~near & ((before == after) | (half < 1e-5)))
+
+    def form(i: IntArray, t: FloatArray) -> FloatArray:
+        c = curves[i, None]
+        r = evaluate(c, t)
+        return _quotient(_moment(r, derivative(c, t)), square(r))
+
+    value, error = _integrate(form, panels(np.ones(m), short), m, tolerance, analytic=False)
+    turns = 2.0 * np.pi * _nadir_winding(curves, light, n)
+    return _estimate(_sums(light, value, n) - turns, _sums(light, error, n), shape)
+
+
+def _nadir_winding(curves: FloatArray, light: IntArray, n: int) -> FloatArray:
+    """Return how often lights (m, 4, 3) cover the nadir, signed (n)."""
+    # Where y changes sign at x > 0 the projection passes the half line; rising counts 1.
+    places, count = sign_changes(curves[:, :, 1])
+    x = evaluate(curves[:, None], places)[..., 0]
+    rises = (curves[:, :1, 1] > 0.0) == (np.arange(3) % 2 == 1)
+    passes = (np.arange(3) < count[:, None]) & (x > 0.0)
+    turns = _sums(light, np.sum(np.where(rises, 1.0, -1.0) * passes, axis=-1), n)
+    for k in np.flatnonzero(turns):
+        points = curves[light == k].reshape(-1, 3)
+        offset = points - points[0]
+        normals = np.cross(offset[np.argmax(_square(offset))], offset)
+        normal = normals[np.argmax(_square(normals))]
+        if not normal[2] * (normal @ points[0]) < 0.0:
+            turns[k] = 0.0  # the plane passes above the origin, so the light covers the zenith
+    return turns
+
+
+def guided_form_factor(
+    contours: Sequence[npt.ArrayLike], nodes: int = 8, limit: float = 0.5
+) -> tuple[FloatArray, IntArray]:
+    """Return `form_factor` by quadrature guided by poles, and what it cost.
+
+    Parameters
+    ----------
+    contours : sequence of (..., k, 4, 3) float64
+        As for `form_factor`.
+    nodes : int
+        Gauss-Legendre nodes a panel.
+    limit : float
+        A panel is halved while 1/rho exceeds this.
+
+    Returns
+    -------
+    value : (...) float64
+        Form factors.
+    evaluations : (...) intp
+        Nodes spent, over all curves.
+
+    Notes
+    -----
+    Where the curve was straight, |r|^2 would vanish at t = m - r.r'/|r'|^2 +- i |r x r'|/|r'|^2.
+    With w that place in units of the panel's half width, rho = |w + sqrt(w^2 - 1)|, and n nodes
+    err like rho^(-2n). The pole is estimated at the panel's middle; no
+    threshold depends on roughness.
+    """
+    curves, light, shape = _flat(contours)
+    n = int(np.prod(shape))
+    evaluations = np.zeros(n, dtype=np.intp)
+    region = _clip(curves, light)
+
+    def guided(c: FloatArray) -> tuple[FloatArray, FloatArray]:
+        def ready(i: IntArray, m: FloatArray, half: FloatArray) -> BoolArray:
+            r, dr = evaluate(c[i], m), derivative(c[i], m)
+            return _rho(r, dr, half) >= 1.0 / limit
+
+        item, lo, hi = panels(np.ones(c.shape[0]), ready)
+        x, w = gauss_legendre(nodes)
+        value = np.zeros(c.shape[0])
+        for start in range(0, item.size, 8192):
+            chunk = slice(start, start + 8192)
+            i, low, width = item[chunk], lo[chunk], (hi - lo)[chunk]
+            t = low[:, None] + width[:, None] * x
+            r, dr = evaluate(c[i, None], t), derivative(c[i, None], t)
+            sums = (_quotient(_moment(r, dr), _square(r)) @ w) * width
+            value += _sums(i, sums, c.shape[0])
+        evaluations[:] = nodes * np.bincount(region.light[item], minlength=n)
+        return value, np.zeros_like(value)
+
+    value = _per_light(curves, light, shape, guided).value
+    return value, evaluations.reshape(shape)
+
+
+def _rho(r: FloatArray, dr: FloatArray, half: FloatArray) -> FloatArray:
+    """Return the size rho of the ellipse about [-half, half] through the poles of 1/|r + s dr|^2.
+
+    Large where the velocity vanishes.
+    """
+    cross = np.cross(r, dr)
+    reach = half * _square(dr)
+    tiny = reach <= 1e-12 * np.sqrt(_square(r) * _square(dr))
+    reach = np.where(tiny, 1.0, reach)
+    w = (-np.sum(r * dr, axis=-1) + 1j * np.sqrt(_square(cross))) / reach
+    root = np.sqrt(w * w - 1.0)
+    rho = np.maximum(np.abs(w + root), np.abs(w - root))
+    return np.asarray(np.where(tiny, 1e12, rho))
+
+
+# --- Linearly transformed cosines ---------------------------------------------------------
+
+
+def ltc_form_factor(
+    cosine_from_shading: npt.ArrayLike, contours: Sequence[npt.ArrayLike]
+) -> Estimate:
+    """Return the integral of a linearly transformed cosine over lights with curved outlines.
+
+    Parameters
+    ----------
+    cosine_from_shading : (..., 3, 3) float64
+        The paper's M^-1, of positive determinant.
+    contours : sequence of (..., k, 4, 3) float64
+        As for `form_factor`, in the shading frame; leading axes broadcast with the matrices'.
+
+    Returns
+    -------
+    Estimate
+        As `ltc.polygon.ltc_polygon_form_factor` for polygons: the lobe's share that falls on the
+        light's part above the surface, at most 1 - `ltc.transform.leak`.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit or a contour has gaps.
+
+    Notes
+    -----
+    The light is clipped at the surface's horizon, its boundary transformed, clipped at the
+    lobe's horizon and integrated.
+    """
+    matrix = np.asarray(cosine_from_shading, dtype=np.float64)
+    if matrix.ndim < 2 or matrix.shape[-2:] != (3, 3):
+        raise ValueError(f"cosine_from_shading has shape {matrix.shape}, expected (..., 3, 3)")
+    lead = np.zeros((*matrix.shape[:-2], 0, 4, 3))  # no curves: only its leading axes matter
+    curves, light, shape = _flat([*contours, lead])
+    m = np.broadcast_to(matrix, (*shape, 3, 3)).reshape(-1, 3, 3)
+    curves, light = _closed_curves(_clip(curves, light))
+    # Term by term: equal points must stay equal to the last bit, which einsum does not promise.
+    row = m[light, None]
+    moved = row[..., 0] * curves[..., :1] + row[..., 1] * curves[..., 1:2]
+    moved = moved + row[..., 2] * curves[..., 2:]
+    return _per_light(moved, light, shape, lambda c: _by_quadrature(c, 1e-13))
+
+
+def ltc_specular(
+    shading_from_cosine: npt.ArrayLike,
+    contours: Sequence[npt.ArrayLike],
+    albedo: npt.ArrayLike,
+) -> FloatArray:
+    """Return the reflected radiance of a light of radiance 1 by the technique ``ltc``.
+
+    Parameters
+    ----------
+    shading_from_cosine : (..., 3, 3) float64
+        The paper's M, of positive determinant.
+    contours : sequence of (..., k, 4, 3) float64
+        As for `form_factor`, positive for counter-clockwise about +z.
+    albedo : (...) float64
+        Directional albedo, f0 (A - B) + B of `ltc.brdf.directional_albedo`.
+
+    Returns
+    -------
+    (...) float64
+        albedo E / (1 - leak), as `ltc.polygon.ltc_specular`.
+
+    Raises
+    ------
+    ValueError
+        For other shapes, a contour with gaps or a singular matrix.
+    """
+    share = ltc_form_factor(transform.invert(shading_from_cosine), contours).value
+    return np.asarray(
+        np.asarray(albedo, dtype=np.float64) * share / (1.0 - transform.leak(shading_from_cosine))
+    )
