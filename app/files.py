@@ -1,4 +1,4 @@
-"""Writing files in one step: either the old or the whole new file is there, never half."""
+"""Paths in files, and writing in one step: the old or the whole new file is there, never half."""
 
 from __future__ import annotations
 
@@ -72,3 +72,18 @@ def _default_mode() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return 0o666 & ~mask
+
+
+def absolute_path(path: str | Path) -> str:
+    """Return an absolute path without "..", links kept: the inverse of `os.path.relpath`."""
+    return os.path.abspath(path)  # noqa: PTH100 (Path.resolve would follow links)
+
+
+def relative_path(path: str, base: Path | None) -> str:
+    """Return a path as a file in the folder ``base`` refers to it; absolute if that is None."""
+    if base is None:
+        return absolute_path(path)
+    try:
+        return Path(os.path.relpath(absolute_path(path), base.resolve())).as_posix()
+    except ValueError:  # another drive
+        return absolute_path(path)

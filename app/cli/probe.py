@@ -21,9 +21,9 @@ from app.cli.common import (
 )
 from app.errors import InputError, nearest, os_reason, require_file
 from app.files import check_output, replace_file
+from app.json_reader import LARGEST_NUMBER
 from app.render.techniques import AUTOMATIC, find_technique, suited_technique
 from app.scene import ALPHA_MIN, RenderSettings
-from app.scene_io import LARGEST_NUMBER
 
 FloatArray = NDArray[np.float64]
 

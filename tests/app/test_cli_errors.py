@@ -277,11 +277,43 @@ CASES: dict[str, Case] = {
     "texture": bad_scene(
         scene(lights=[{"texture": {"image": "a.png"}}]), "lights[0].texture", "not supported"
     ),
-    "text light": bad_scene(
-        scene(lights=[{"text": {"string": "A"}}]), "lights[0].text", "not supported"
+    # Sources
+    "text without a string": bad_scene(
+        scene(lights=[{"text": {"size": 2}}]), "lights[0].text", 'no "string"'
     ),
-    "SVG light": bad_scene(
-        scene(lights=[{"svg": "a.svg"}]), "lights[0].svg", "not supported by this version"
+    "text of a number": bad_scene(scene(lights=[{"text": 3}]), "lights[0].text", "number 3"),
+    "empty text": bad_scene(
+        scene(lights=[{"text": {"string": " "}}]), "lights[0].text", "the text is empty"
+    ),
+    "size of no text": bad_scene(
+        scene(lights=[{"text": {"string": "A", "size": 0}}]), "lights[0].text.size", "above 0"
+    ),
+    "misspelt key of a text": bad_scene(
+        scene(lights=[{"text": {"string": "A", "lineheight": 1}}]), "did you mean 'line_height'"
+    ),
+    "alignment": bad_scene(
+        scene(lights=[{"text": {"string": "A", "align": "centre"}}]),
+        "lights[0].text.align", "did you mean 'center'",
+    ),
+    "font missing": bad_scene(
+        scene(lights=[{"text": {"string": "A", "font": "gone.ttf"}}]),
+        "lights[0].text", "gone.ttf: there is no such file", ".ttf, .otf",
+    ),
+    "font is a folder": bad_scene(
+        scene(lights=[{"text": {"string": "A", "font": "."}}]), "lights[0].text", "is a folder"
+    ),
+    "font is no font": bad_scene(
+        scene(lights=[{"text": {"string": "A", "font": "scene.json"}}]),
+        "lights[0].text", "scene.json: damaged or no font",
+    ),
+    "letter not in the font": bad_scene(
+        scene(lights=[{"text": "A\u4e2d"}]), "lights[0].text", "no glyph", "(U+4E2D)"
+    ),
+    "text and drawing": bad_scene(
+        scene(lights=[{"text": "A", "svg": "a.svg"}]), "lights[0]", "both text and svg"
+    ),
+    "drawing without a path": bad_scene(
+        scene(lights=[{"svg": {"size": 1}}]), "lights[0].svg", '"path" is missing'
     ),
     # Meshes
     "misspelt built-in": bad_mesh("spehre", None, "did you mean 'sphere'", ".obj"),

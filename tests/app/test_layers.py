@@ -20,6 +20,7 @@ PURE = {
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
     "app.lights", "app.planes", "app.contours", "app.step_names", "app.gui.messages",
     "app.gui.shortcuts", "app.gui.beginning", "app.gui.documents",
+    "app.loops", "app.text", "app.text_runs", "app.json_reader", "app.json_writer", "app.light_io",
 }  # fmt: skip
 WINDOW = {
     "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",
