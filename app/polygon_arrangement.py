@@ -177,7 +177,8 @@ def _merged(vertices: FloatArray, start: IntArray, end: IntArray, count: IntArra
 def _split_once(pieces: _Pieces) -> _Pieces | None:
     """Split pieces where others touch or cross them; None if there is nothing to split."""
     vertices, start, end = pieces.vertices, pieces.start, pieces.end
-    one, two = overlapping_boxes(vertices[start], vertices[end])
+    a, b = vertices[start], vertices[end]
+    one, two = overlapping_boxes(np.minimum(a, b) - 1.0, np.maximum(a, b) + 1.0)
     piece, cut = [], []  # which piece is split at which vertex
     crossing = np.ones(len(one), dtype=bool)
     sides = []
@@ -225,12 +226,11 @@ def _split_once(pieces: _Pieces) -> _Pieces | None:
     return _merged(vertices, stop[:-1][inner], stop[1:][inner], pieces.count[owner[:-1][inner]])
 
 
-def overlapping_boxes(a: FloatArray, b: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return all pairs of segments whose bounding boxes, a little enlarged, overlap."""
-    low, high = np.minimum(a, b) - 1.0, np.maximum(a, b) + 1.0
+def overlapping_boxes(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return all pairs of boxes, given by their corners (n, 2), that overlap."""
     order = np.argsort(low[:, 0], kind="stable")
     low, high = low[order], high[order]
-    # In order of their left ends, a segment meets those that begin before its right end.
+    # In order of their left ends, a box meets those that begin before its right end.
     stop = np.searchsorted(low[:, 0], high[:, 0], side="right")
     ones, twos = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     first = 0
@@ -264,7 +264,8 @@ def _boundary_loops(pieces: _Pieces, fill_rule: FillRule) -> list[FloatArray]:
     flip = inside_right[separates]
     start, end = pieces.start[separates], pieces.end[separates]
     start, end = np.where(flip, end, start), np.where(flip, start, end)
-    return [pieces.vertices[loop] for loop in _linked(pieces.vertices, start, end)]
+    ahead = pieces.vertices[end] - pieces.vertices[start]
+    return [pieces.vertices[start[loop]] for loop in linked(start, end, ahead, -ahead)]
 
 
 def _winding_on_the_right(pieces: _Pieces) -> IntArray:
@@ -331,26 +332,40 @@ def _winding_by_ray(a: FloatArray, b: FloatArray, count: IntArray, piece: int) -
     return ahead if step[1] > 0.0 else ahead - int(count[piece])
 
 
-def _linked(vertices: FloatArray, start: IntArray, end: IntArray) -> list[list[int]]:
-    """Link directed edges, interior on their left, to loops without repeated vertices."""
+def linked(start: IntArray, end: IntArray, ahead: FloatArray, back: FloatArray) -> list[list[int]]:
+    """Link directed edges, interior on their left, to loops without repeated vertices.
+
+    Parameters
+    ----------
+    start, end : (n,) int64
+        Vertices.
+    ahead, back : (n, 2) float64
+        In which direction each edge leaves its start, and seen from its end,
+        the one that it came from.
+
+    Returns
+    -------
+    list of list of int
+        The edges of each loop. What cannot be linked is left out.
+    """
     leaving: dict[int, list[int]] = {}
     for edge, vertex in enumerate(start.tolist()):
         leaving.setdefault(vertex, []).append(edge)
     ends = end.tolist()
 
-    def next_edge(came_from: int, at: int) -> int | None:
+    def next_edge(came_by: int) -> int | None:
         """Take the edge that bounds the same interior: the first one clockwise from behind."""
-        choices = leaving.get(at, [])
+        choices = leaving.get(ends[came_by], [])
         if not choices:
             return None
         chosen = 0
         if len(choices) > 1:
-            back = vertices[came_from] - vertices[at]
+            behind = back[came_by]
             turns = []
             for edge in choices:
-                ahead = vertices[ends[edge]] - vertices[at]
                 angle = math.atan2(
-                    back[0] * ahead[1] - back[1] * ahead[0], back[0] * ahead[0] + back[1] * ahead[1]
+                    behind[0] * ahead[edge][1] - behind[1] * ahead[edge][0],
+                    behind[0] * ahead[edge][0] + behind[1] * ahead[edge][1],
                 )
                 turns.append(-angle if angle < 0.0 else math.tau - angle)
             chosen = turns.index(min(turns))
@@ -359,22 +374,23 @@ def _linked(vertices: FloatArray, start: IntArray, end: IntArray) -> list[list[i
     loops: list[list[int]] = []
     for first in list(leaving):
         while leaving[first]:
-            path, place = [first], {first: 0}
+            # The edges so far, and by which of them each vertex on the way was left.
+            path: list[int] = []
+            place = {first: 0}
             taken: int | None = leaving[first].pop()
             while taken is not None:
+                path.append(taken)
                 vertex = ends[taken]
                 if vertex in place:
                     begin = place[vertex]
                     loop = path[begin:]
                     loops.append(loop)
-                    del path[begin + 1 :]
-                    for passed in loop[1:]:
-                        del place[passed]
-                    taken = next_edge(loop[-1], vertex)
+                    del path[begin:]
+                    for passed in loop[:-1]:
+                        del place[ends[passed]]
                 else:
                     place[vertex] = len(path)
-                    path.append(vertex)
-                    taken = next_edge(path[-2], vertex)
+                taken = next_edge(taken)
     return loops
 
 

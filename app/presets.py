@@ -64,7 +64,8 @@ def rounded_rectangle(width: float = 2.0, height: float = 1.2, radius: float = 0
             curves.append(_line(curves[-1][3], arcs[0][0]))
             kinds.append("smooth")
         curves += arcs
-        kinds += ["smooth"] + [SYMMETRIC] * (quarter - 1)
+        kinds.append("smooth")
+        kinds.extend([SYMMETRIC] * (quarter - 1))
     if curves[-1][3] != curves[0][0]:
         curves.append(_line(curves[-1][3], curves[0][0]))
         kinds.append("smooth")
