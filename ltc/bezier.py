@@ -257,24 +257,40 @@ def _monotone_roots(b: FloatArray) -> tuple[FloatArray, BoolArray]:
     # An end that is zero is the root.
     hi = np.where(changes & (f_lo == 0.0), lo, hi)
     lo = np.where(changes & (f_hi == 0.0), hi, lo)
-    lo, hi = np.where(changes, lo, 1.0), np.where(changes, hi, 1.0)
-    t = 0.5 * (lo + hi)
-    for step in range(130):  # every other step halves the bracket, so 2 x 64 always suffice
-        f = _bernstein(b, t)
-        beyond = (f > 0.0) == rising
-        lo, hi = np.where(beyond, lo, t), np.where(beyond, t, hi)
-        if np.all((hi - lo <= 2e-16 * hi) | (f == 0.0)):
-            break
+    places = np.ones_like(lo)
+    row = np.nonzero(changes)[0]
+    places[changes] = _bracketed_newton(b[row], lo[changes], hi[changes], rising[changes])
+    return places, changes
+
+
+def _bracketed_newton(
+    b: FloatArray, lo: FloatArray, hi: FloatArray, rising: BoolArray
+) -> FloatArray:
+    """Return the sign changes (m) of cubics (m, 4) in brackets, to about 1e-15."""
+    places = 0.5 * (lo + hi)
+    d = np.diff(b, axis=-1)
+    item = np.flatnonzero(hi > lo)
+    step = 0
+    while item.size:  # every other step halves the bracket, so it ends
+        t, low, high = places[item], lo[item], hi[item]
+        f = _bernstein(b[item], t[:, None])[:, 0]
+        beyond = (f > 0.0) == rising[item]
+        low, high = np.where(beyond, low, t), np.where(beyond, t, high)
         s = 1.0 - t
-        d0, d1, d2 = (d[:, j, None] for j in range(3))
+        d0, d1, d2 = (d[item, j] for j in range(3))
         slope = 3.0 * (s * (s * d0 + t * d1) + t * (s * d1 + t * d2))
         flat = np.abs(slope) <= np.abs(f)
         newton = t - np.where(flat, 0.0, f) / np.where(flat, 1.0, slope)
         # A little past the root, so that the other end of the bracket follows.
         newton += np.copysign(4e-16, newton - t)
-        good = (newton > lo) & (newton < hi) & ~flat & (step % 2 == 0)
-        t = np.where(f == 0.0, t, np.where(good, newton, 0.5 * (lo + hi)))
-    return t, changes
+        good = (newton > low) & (newton < high) & ~flat & (step % 2 == 0)
+        # Once the bracket is as narrow as doubles are, both ends are the root.
+        left = (f != 0.0) & (high - low > 1e-15)
+        places[item] = np.where(f == 0.0, t, np.where(good, newton, 0.5 * (low + high)))
+        lo[item], hi[item] = low, high
+        item = item[left]
+        step += 1
+    return places
 
 
 # --- Ragged lists of curves ---------------------------------------------------------------
@@ -398,6 +414,35 @@ def _closed_curves(region: Region) -> tuple[FloatArray, IntArray]:
         np.concatenate([region.curves, np.repeat(lines, times, axis=0)]),
         np.concatenate([region.light, np.repeat(region.segment_light, times)]),
     )
+
+
+def clip_to_horizon(
+    contours: Sequence[npt.ArrayLike],
+) -> tuple[FloatArray, IntArray, tuple[int, ...]]:
+    """Return what bounds the parts of lights above the plane z = 0.
+
+    Parameters
+    ----------
+    contours : sequence of (..., k, 4, 3) float64
+        As for `form_factor`.
+
+    Returns
+    -------
+    curves : (m, 4, 3) float64
+        Cubics that form closed contours with z >= 0: parts of the outlines, and segments
+        of the horizon, where z is exactly 0. None for a light below the horizon.
+    light : (m) intp
+        The light that each belongs to, counted over the leading axes in C order.
+    shape : tuple of int
+        The leading axes.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit or a contour has gaps.
+    """
+    curves, light, shape = _flat(contours)
+    return *_closed_curves(_clip(curves, light)), shape
 
 
 def _sums(item: IntArray, values: npt.ArrayLike, n: int) -> FloatArray:
@@ -753,9 +798,8 @@ def ltc_form_factor(
     if matrix.ndim < 2 or matrix.shape[-2:] != (3, 3):
         raise ValueError(f"cosine_from_shading has shape {matrix.shape}, expected (..., 3, 3)")
     lead = np.zeros((*matrix.shape[:-2], 0, 4, 3))  # no curves: only its leading axes matter
-    curves, light, shape = _flat([*contours, lead])
+    curves, light, shape = clip_to_horizon([*contours, lead])
     m = np.broadcast_to(matrix, (*shape, 3, 3)).reshape(-1, 3, 3)
-    curves, light = _closed_curves(_clip(curves, light))
     # Term by term: equal points must stay equal to the last bit, which einsum does not promise.
     row = m[light, None]
     moved = row[..., 0] * curves[..., :1] + row[..., 1] * curves[..., 1:2]

@@ -1,10 +1,11 @@
-"""Ground truth: GGX integrated over polygon lights, three independent ways.
+"""Ground truth: GGX integrated over polygon and curved lights, three independent ways.
 
 `specular_integral` and its fast form for many lights, `specular_integral_batch`,
 follow the light's outline in the space of half vectors. `specular_monte_carlo`
 samples visible normals and asks whether they reflect the viewer into the light.
 `specular_area_integral` walks over the light itself, which needs a rough
 surface. They share nothing but `ltc.brdf`, and the last two not the space either.
+Lights bounded by cubic Béziers have the first two, with ``curve_`` before their names.
 
 Why the boundary suffices. Let S = diag(1/ax, 1/ay, 1), v' = S^-1 v normalised
 and h' = S (v + o) for the light direction o. GGX's visible normals then have the
@@ -25,13 +26,13 @@ Lights have radiance 1; loops count positive counter-clockwise about +z, like
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from ltc import brdf
+from ltc import bezier, brdf
 from ltc.polygon import clip_to_horizon
 from ltc.quadrature import gauss_legendre, halve, legendre_matrix, panels, tail
 
@@ -199,6 +200,17 @@ def specular_monte_carlo(
     Samples `ltc.brdf.sample_visible_normals`, reflects the viewer and averages
     G2/G1 times the light's `winding_number`.
     """
+    return _monte_carlo(lambda w: winding_number(loops, w), wo, alpha_x, alpha_y, samples, rng)
+
+
+def _monte_carlo(
+    winding: Callable[[FloatArray], FloatArray],
+    wo: npt.ArrayLike,
+    alpha_x: float,
+    alpha_y: float,
+    samples: int,
+    rng: np.random.Generator,
+) -> Specular:
     view = _view(wo, alpha_x, alpha_y)
     if view[2] <= 0.0:
         return Specular(0.0, 0.0, 0.0)
@@ -207,7 +219,7 @@ def specular_monte_carlo(
     value = np.zeros(samples)
     up = wi[:, 2] > 0.0
     smith = brdf.smith_g2(view, wi[up], alpha_x, alpha_y) / brdf.smith_g1(view, alpha_x, alpha_y)
-    value[up] = winding_number(loops, wi[up]) * smith
+    value[up] = winding(wi[up]) * smith
     fresnel = value * brdf.schlick_fresnel(h @ view, 0.0)
     error = np.std(value) / np.sqrt(samples)
     return Specular(float(np.mean(value)), float(np.mean(fresnel)), float(error))
@@ -330,18 +342,10 @@ def specular_integral_batch(
     configuration then takes 0.8 ms, and 1.4 ms (3 ms anisotropic) with 12 nodes.
     """
     p = np.asarray(vertices, dtype=np.float64)
-    wo = np.asarray(wo, dtype=np.float64)
     if p.ndim < 2 or p.shape[-1] != 3 or p.shape[-2] < 3:
         raise ValueError(f"vertices have shape {p.shape}, expected (..., N >= 3, 3)")
-    if wo.ndim < 1 or wo.shape[-1] != 3:
-        raise ValueError(f"wo has shape {wo.shape}, expected (..., 3)")
-    ax, ay = np.asarray(alpha_x, dtype=np.float64), np.asarray(alpha_y, dtype=np.float64)
-    if not (np.all(ax > 0.0) and np.all(ay > 0.0)):
-        raise ValueError("alpha_x and alpha_y must be positive numbers")
-    shape = np.broadcast_shapes(p.shape[:-2], wo.shape[:-1], ax.shape, ay.shape)
+    shape, wo, ax, ay = _configurations(p.shape[:-2], wo, alpha_x, alpha_y)
     p = np.broadcast_to(p, (*shape, *p.shape[-2:])).reshape(-1, *p.shape[-2:])
-    wo = np.broadcast_to(wo, (*shape, 3)).reshape(-1, 3)
-    ax, ay = (np.broadcast_to(a, shape).reshape(-1) for a in (ax, ay))
     out = np.zeros((3, p.shape[0]))
     for i in range(0, p.shape[0], chunk):
         part = slice(i, i + chunk)
@@ -359,6 +363,170 @@ def specular_integral_batch(
             tolerance,
         )
     return out[0].reshape(shape), out[1].reshape(shape)
+
+
+def _configurations(
+    lead: tuple[int, ...], wo: npt.ArrayLike, alpha_x: npt.ArrayLike, alpha_y: npt.ArrayLike
+) -> tuple[tuple[int, ...], FloatArray, FloatArray, FloatArray]:
+    """Return the common shape of lights, views and alphas, and wo (n, 3) and alphas (n) in it."""
+    wo = np.asarray(wo, dtype=np.float64)
+    if wo.ndim < 1 or wo.shape[-1] != 3:
+        raise ValueError(f"wo has shape {wo.shape}, expected (..., 3)")
+    ax, ay = np.asarray(alpha_x, dtype=np.float64), np.asarray(alpha_y, dtype=np.float64)
+    if not (np.all(ax > 0.0) and np.all(ay > 0.0)):
+        raise ValueError("alpha_x and alpha_y must be positive numbers")
+    shape = np.broadcast_shapes(lead, wo.shape[:-1], ax.shape, ay.shape)
+    wo = np.broadcast_to(wo, (*shape, 3)).reshape(-1, 3)
+    ax, ay = (np.broadcast_to(a, shape).reshape(-1) for a in (ax, ay))
+    return shape, wo, ax, ay
+
+
+def curve_specular_integral(
+    contours: Sequence[npt.ArrayLike],
+    wo: npt.ArrayLike,
+    alpha_x: float,
+    alpha_y: float,
+    tolerance: float = 1e-9,
+) -> Specular:
+    """Return GGX integrated over one light with a curved outline, with an error estimate.
+
+    Parameters
+    ----------
+    contours : sequence of (k, 4, 3) float64
+        Closed contours of cubic Béziers in the tangent frame, in one plane, anywhere about the
+        horizon; each curve ends where the next begins, holes are wound against the
+        outer contours.
+    wo, alpha_x, alpha_y, tolerance
+        As for `specular_integral`.
+
+    Returns
+    -------
+    Specular
+        As `specular_integral`, along the curves themselves: nothing is flattened.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, a contour has gaps or an alpha is not positive.
+    """
+    view = _view(wo, alpha_x, alpha_y)
+    one, fresnel, error = _curve_core(
+        contours, view[None], np.array([alpha_x]), np.array([alpha_y]), 12, tolerance
+    )[:, 0]
+    return Specular(float(one), float(fresnel), float(error) + 1e-13)
+
+
+def curve_specular_integral_batch(
+    contours: Sequence[npt.ArrayLike],
+    wo: npt.ArrayLike,
+    alpha_x: npt.ArrayLike,
+    alpha_y: npt.ArrayLike,
+    nodes: int = 8,
+    tolerance: float = 1e-6,
+    chunk: int = 64,
+) -> tuple[FloatArray, FloatArray]:
+    """Return GGX integrated over many lights of radiance 1 with curved outlines.
+
+    Parameters
+    ----------
+    contours : sequence of (..., k, 4, 3) float64
+        As for `curve_specular_integral`, counter-clockwise about +z for positive.
+    wo, alpha_x, alpha_y, nodes, tolerance, chunk
+        As for `specular_integral_batch`; all leading axes broadcast.
+
+    Returns
+    -------
+    one, fresnel : (...) float64
+        As `specular_integral_batch`.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, a contour has gaps or an alpha is not positive.
+    """
+    arrays = [np.asarray(contour, dtype=np.float64) for contour in contours]
+    for k, p in enumerate(arrays):
+        if p.ndim < 3 or p.shape[-2:] != (4, 3):
+            raise ValueError(f"contour {k} has shape {p.shape}, expected (..., k, 4, 3)")
+    lead = np.broadcast_shapes(*(p.shape[:-3] for p in arrays))
+    shape, wo, ax, ay = _configurations(lead, wo, alpha_x, alpha_y)
+    arrays = [
+        np.broadcast_to(p, (*shape, *p.shape[-3:])).reshape(-1, *p.shape[-3:]) for p in arrays
+    ]
+    out = np.zeros((3, wo.shape[0]))
+    for i in range(0, wo.shape[0], chunk):
+        part = slice(i, i + chunk)
+        out[:, part] = _curve_core(
+            [p[part] for p in arrays], wo[part], ax[part], ay[part], nodes, tolerance
+        )
+    return out[0].reshape(shape), out[1].reshape(shape)
+
+
+def curve_winding_number(contours: Sequence[npt.ArrayLike], w: npt.ArrayLike) -> FloatArray:
+    """Return how often a planar light's curved contours run around directions.
+
+    Parameters
+    ----------
+    contours : sequence of (k, 4, 3) float64
+        Closed contours of cubic Béziers in one plane.
+    w : (n, 3) float64
+        Directions from the origin.
+
+    Returns
+    -------
+    (n) float64
+        As `winding_number`.
+    """
+    w = np.asarray(w, dtype=np.float64)
+    count = np.zeros(w.shape[0])
+    curves = np.concatenate([np.zeros((0, 4, 3)), *(np.asarray(c) for c in contours)])
+    n = _plane_normal(curves.reshape(-1, 3))
+    if curves.size == 0 or not np.any(n):
+        return count
+    height, toward = float(curves[0, 0] @ n), w @ n
+    hits = toward * height > 0.0
+    t = _unit(np.cross(n, np.eye(3)[np.argmin(np.abs(n))]))
+    s = np.cross(n, t)
+    points = w[hits] * (height / toward[hits])[:, None]
+    px, py = curves @ t, curves @ s
+    found = np.zeros(points.shape[0])
+    for start in range(0, found.size, 4096):
+        part = slice(start, start + 4096)
+        # Where the outline passes the half line +x from a point.
+        x, y = (points[part] @ t)[:, None], (points[part] @ s)[:, None]
+        heights = py - y[..., None]
+        places, crossings = bezier.sign_changes(heights)
+        at = bezier.evaluate(px[:, None, :, None], places)[..., 0]
+        rises = (heights[..., :1] > 0.0) == (np.arange(3) % 2 == 1)
+        passes = (np.arange(3) < crossings[..., None]) & (at > x[..., None])
+        found[part] = np.sum(np.where(rises, 1.0, -1.0) * passes, axis=(-2, -1))
+    count[hits] = found * np.sign(height)
+    return count
+
+
+def _plane_normal(points: FloatArray) -> FloatArray:
+    """Return the unit normal (3) of the plane of points (m, 3), either way; 0 if on one line."""
+    if points.size == 0:
+        return np.zeros(3)
+    offset = points - points[0]
+    normals = np.cross(offset[np.argmax(_dot(offset, offset))], offset)
+    normal = normals[np.argmax(_dot(normals, normals))]
+    length = np.sqrt(normal @ normal)
+    return np.asarray(normal / length if length > 0.0 else normal)
+
+
+def curve_specular_monte_carlo(
+    contours: Sequence[npt.ArrayLike],
+    wo: npt.ArrayLike,
+    alpha_x: float,
+    alpha_y: float,
+    samples: int,
+    rng: np.random.Generator,
+) -> Specular:
+    """Return a Monte Carlo estimate of `curve_specular_integral`, as `specular_monte_carlo`."""
+    return _monte_carlo(
+        lambda w: curve_winding_number(contours, w), wo, alpha_x, alpha_y, samples, rng
+    )
 
 
 _MAX_SPLITS = 20
@@ -380,57 +548,167 @@ def _core(
     Rows are F = 1, the Fresnel part, and an estimate of the error. Edges are
     clipped to the horizon; those of one configuration form closed loops.
     """
-    n = wo.shape[0]
-    result = np.zeros((3, n))
-    d = b - a
-    normal = np.cross(a, d)
+    normal = np.cross(a, b - a)
     length = np.sqrt(_dot(normal, normal))
     keep = (length > 0.0) & (wo[which, 2] > 0.0)
-    if not np.any(keep):
+    return _boundary_integral(
+        _Arcs.of(a[keep], b[keep], normal[keep], length[keep]),
+        which[keep],
+        wo,
+        ax,
+        ay,
+        nodes,
+        tolerance,
+    )
+
+
+def _curve_core(
+    contours: Sequence[npt.ArrayLike],
+    wo: FloatArray,
+    ax: FloatArray,
+    ay: FloatArray,
+    nodes: int,
+    tolerance: float,
+) -> FloatArray:
+    """Return (3, n), as `_core`, over contours (n, k, 4, 3) anywhere about the horizon."""
+    curves, which, _ = bezier.clip_to_horizon(contours)
+    keep = np.any(np.diff(curves, axis=-2), axis=(-2, -1)) & (wo[which, 2] > 0.0)
+    return _boundary_integral(_Cubics(curves[keep]), which[keep], wo, ax, ay, nodes, tolerance)
+
+
+class _Boundary(Protocol):
+    """Pieces of the boundary of lights as curves o(s) of directions, 0 <= s <= end."""
+
+    @property
+    def end(self) -> FloatArray:
+        """(m): where the pieces end."""
+
+    def at(self, e: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return (o, do/ds), (p, 3) each, of pieces e (p)."""
+
+    def ready(self, e: IntArray, m: FloatArray, half: FloatArray) -> tuple[BoolArray, FloatArray]:
+        """Return whether o has no pole near panels, and d2o/ds2 (p, 3) at their middles m."""
+
+    def chords(self) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Return (piece, direction, next direction) of chords that follow the pieces."""
+
+
+class _Arcs(NamedTuple):
+    """Straight edges: o = o0 cos(s) + o1 sin(s)."""
+
+    end: FloatArray
+    o0: FloatArray
+    o1: FloatArray
+    stop: FloatArray
+
+    @classmethod
+    def of(cls, a: FloatArray, b: FloatArray, normal: FloatArray, length: FloatArray) -> _Arcs:
+        o0 = _unit(a)
+        o1 = np.cross(normal / length[:, None], o0)
+        return cls(np.arctan2(length, _dot(a, b)), o0, o1, _unit(b))
+
+    def at(self, e: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        cos, sin = np.cos(s)[:, None], np.sin(s)[:, None]
+        return self.o0[e] * cos + self.o1[e] * sin, self.o1[e] * cos - self.o0[e] * sin
+
+    def ready(self, e: IntArray, m: FloatArray, half: FloatArray) -> tuple[BoolArray, FloatArray]:
+        return half < 0.4, -self.at(e, m)[0]
+
+    def chords(self) -> tuple[IntArray, FloatArray, FloatArray]:
+        return np.arange(self.end.size), self.o0, self.stop
+
+
+class _Cubics(NamedTuple):
+    """Cubic Béziers r(s): o = r/|r|, 0 <= s <= 1."""
+
+    curves: FloatArray
+
+    @property
+    def end(self) -> FloatArray:
+        return np.ones(self.curves.shape[0])
+
+    def at(self, e: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        r, dr = bezier.evaluate(self.curves[e], s), bezier.derivative(self.curves[e], s)
+        distance = self._distance(r)
+        o = r / distance
+        return o, (dr - o * _dot(o, dr)[:, None]) / distance
+
+    def ready(self, e: IntArray, m: FloatArray, half: FloatArray) -> tuple[BoolArray, FloatArray]:
+        curves = self.curves[e]
+        r, dr = bezier.evaluate(curves, m), bezier.derivative(curves, m)
+        distance = self._distance(r)
+        o, do = self.at(e, m)
+        bend = np.diff(curves, n=2, axis=-2)
+        ddr = 6.0 * ((1.0 - m)[:, None] * bend[:, 0] + m[:, None] * bend[:, 1])
+        # r = |r| o, differentiated twice.
+        ddo = ddr - o * (_dot(do, dr) + _dot(o, ddr))[:, None] - 2.0 * do * _dot(o, dr)[:, None]
+        legs = np.diff(curves, axis=-2)
+        reach = 3.0 * half * np.sqrt(np.max(_dot(legs, legs), axis=-1))
+        return reach <= 0.5 * distance[:, 0], ddo / distance
+
+    def chords(self) -> tuple[IntArray, FloatArray, FloatArray]:
+        r = bezier.evaluate(self.curves[:, None], np.arange(5) / 4.0)
+        o = r / self._distance(r)
+        piece = np.repeat(np.arange(self.curves.shape[0]), 4)
+        return piece, o[:, :-1].reshape(-1, 3), o[:, 1:].reshape(-1, 3)
+
+    @staticmethod
+    def _distance(r: FloatArray) -> FloatArray:
+        # A point on the outline has no integral, but must not stop the others.
+        return np.asarray(np.sqrt(np.maximum(_dot(r, r), 1e-200))[..., None])
+
+
+def _boundary_integral(
+    boundary: _Boundary,
+    which: IntArray,
+    wo: FloatArray,
+    ax: FloatArray,
+    ay: FloatArray,
+    nodes: int,
+    tolerance: float,
+) -> FloatArray:
+    """Return (3, n), as `_core`, from pieces of the boundary of configurations ``which`` (m).
+
+    The views of these configurations are above the surface.
+    """
+    n = wo.shape[0]
+    result = np.zeros((3, n))
+    if which.size == 0:
         return result
-    a, b, which, normal, length = a[keep], b[keep], which[keep], normal[keep], length[keep]
     S = np.stack([1.0 / ax, 1.0 / ay, np.ones_like(ax)], axis=-1)
     L = np.stack([ax, ay, np.ones_like(ax)], axis=-1)
-    # On an edge the light direction is o = o0 cos(phi) + o1 sin(phi), 0 <= phi <= sweep.
-    o0 = _unit(a)
-    o1 = np.cross(normal / length[:, None], o0)
-    sweep = np.arctan2(length, _dot(a, b))
-
-    def on_edge(e: IntArray, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
-        cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]
-        return o0[e] * cos + o1[e] * sin, o1[e] * cos - o0[e] * sin
 
     def edge_ready(e: IntArray, m: FloatArray, half: FloatArray) -> BoolArray:
         i = which[e]
-        o, do = on_edge(e, m)
-        ready = half < 0.4
-        # h' and (ax o_x, ay o_y, o_z), the roots of whose squares are the poles, bend by o'' = -o.
+        o, do = boundary.at(e, m)
+        ready, ddo = boundary.ready(e, m, half)
+        # h' and (ax o_x, ay o_y, o_z), the roots of whose squares are the poles, bend by o''.
         for x, dx, bend in ((wo[i] + o, do, S[i]), (o, do, L[i])):
             x, dx = bend * x, bend * dx
-            curve = 0.5 * half * half * np.sqrt(_dot(bend * o, bend * o))
+            curve = 0.5 * half * half * np.sqrt(_dot(bend * ddo, bend * ddo))
             size = np.sqrt(_dot(x, x) + half * half * _dot(dx, dx))
-            ready &= _line_poles(x, dx, half) & (curve < 0.25 * size)
+            ready = ready & _line_poles(x, dx, half) & (curve < 0.25 * size)
         for t in (-half, np.zeros_like(half), half):
-            z = o[:, 2] * np.cos(t) + do[:, 2] * np.sin(t)
-            slope = do[:, 2] * np.cos(t) - o[:, 2] * np.sin(t)
-            ready &= _smith_pole(np.column_stack([o[:, :2], z]), slope, wo[i], L[i], half, t)
+            o, do = boundary.at(e, m + t)
+            ready &= _smith_pole(o, do[:, 2], wo[i], L[i], half, t)
         return ready
 
     legendre = legendre_matrix(nodes)
     x, w = gauss_legendre(nodes)
     centre: FloatArray | None = None
-    e, lo, hi = panels(sweep, edge_ready)
+    e, lo, hi = panels(boundary.end, edge_ready)
     for last in range(_MAX_SPLITS, -1, -1):
         phi = (lo[:, None] + (hi - lo)[:, None] * x).ravel()
         w_phi = ((hi - lo)[:, None] * w).ravel()
         e_phi = np.repeat(e, nodes)
         i = which[e_phi]
-        o, do = on_edge(e_phi, phi)
+        o, do = boundary.at(e_phi, phi)
         h, dh = S[i] * (wo[i] + o), S[i] * do
         h2 = _dot(h, h)
         u = h / np.sqrt(h2)[:, None]
         if centre is None:
-            centre = _centres(which, S, wo, o0, _unit(b), ax, ay, i, u)
+            piece, start, stop = boundary.chords()
+            centre = _centres(which[piece], S, wo, start, stop, ax, ay, i, u)
         k = w_phi * _dot(centre[i], np.cross(h, dh)) / h2
         values, inner_error = _chords(centre[i], u, k, wo[i], L[i], nodes, tolerance)
         values = values.reshape(2, -1, nodes)
