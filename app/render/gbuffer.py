@@ -17,14 +17,25 @@ from numpy.typing import NDArray
 from app.errors import InputError
 from app.meshes import Mesh, load_mesh
 from app.render.camera import CameraFrame, normal_from_object, world_from_object
-from app.render.pack import LARGEST_NUMBER, SMALLEST_NUMBER, pack_light_shapes
+from app.render.features import STORAGE_TEXTURE_WIDTH
+from app.render.light_shapes import CurvedShape, pack_light_curves, pack_light_triangles
+from app.render.pack import LARGEST_NUMBER, SMALLEST_NUMBER
 from app.render.programs import Programs, ProgramSpec, set_uniform, write_uniform
-from app.render.state import begin_pass
-from app.scene import AreaLight, SceneObject
+from app.render.state import FullScreenTriangle, begin_pass
+from app.render.storage import TexelStorage
+from app.scene import AreaLight, Outline, SceneObject
 
 LIGHTS = ProgramSpec.of("light shapes", "passes/light_shape.vert", "passes/light_shape.frag")
+CURVED_LIGHTS = ProgramSpec.of(
+    "light curves",
+    "passes/light_curves.vert",
+    "passes/light_curves.frag",
+    {"STORAGE_TEXTURE_WIDTH": STORAGE_TEXTURE_WIDTH},
+)
 
 WHOLE_PICTURE = (1.0, 1.0, 0.0, 0.0)
+OUTLINE_UNIT = 0
+"""Texture unit of the curved lights' outlines."""
 
 
 def objects_spec(tangents: bool) -> ProgramSpec:
@@ -128,7 +139,10 @@ def _is_outside(eye: NDArray[np.float64], instance: _Instance, mesh: Mesh) -> bo
 
 
 class GBufferPass:
-    """Owner of the vertex buffers. ``uploads`` counts fillings of meshes and light shapes."""
+    """Owner of the vertex buffers and of the outlines of curved lights.
+
+    ``uploads`` counts fillings of meshes and of light shapes, triangles or curves.
+    """
 
     def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
         self._ctx = ctx
@@ -138,6 +152,10 @@ class GBufferPass:
         self._tangents = False
         self._shapes: _Vertices | None = None
         self._shape_counts = (0, 0)
+        self._curved: tuple[CurvedShape, ...] = ()
+        self._outlines = TexelStorage(ctx, "outline", "Outlines")
+        self._outlines_held: tuple[Outline, ...] = ()
+        self._triangle = FullScreenTriangle(ctx)
         self.uploads = {"meshes": 0, "light shapes": 0}
 
     @property
@@ -172,15 +190,34 @@ class GBufferPass:
         self._tangents = tangents
 
     def set_lights(self, lights: Sequence[AreaLight]) -> None:
-        """Hold the triangles of the visible ones of ``lights``."""
+        """Hold the triangles, or the curves, of the visible ones of ``lights``."""
         if self._shapes is not None:
             self._shapes.release()
             self._shapes = None
-        shapes = pack_light_shapes(lights)
+        shapes = pack_light_triangles(lights)
         if len(shapes.vertices):
             self._shapes = _Vertices(self._ctx, shapes.vertices.tobytes(), "3f 3f 1f")
             self._shape_counts = (shapes.one_sided, len(shapes.vertices) - shapes.one_sided)
             self.uploads["light shapes"] += 1
+        self._set_curves(lights)
+
+    def _set_curves(self, lights: Sequence[AreaLight]) -> None:
+        texels, self._curved = pack_light_curves(lights)
+        if not self._curved:
+            self._drop_curves()
+            return
+        # A light that moves keeps its curves: they do not depend on its plane.
+        outlines = tuple(lights[-1 - shape.id].outline for shape in self._curved)
+        if outlines != self._outlines_held:
+            self._outlines.update(texels, 0)
+            self._outlines_held = outlines
+            self.uploads["light shapes"] += 1
+
+    def _drop_curves(self) -> None:
+        self._outlines.release()
+        self._outlines_held = ()
+        self._curved = ()
+        self._triangle.release()
 
     def draw(
         self,
@@ -229,12 +266,42 @@ class GBufferPass:
             if two_sided:
                 ctx.disable(moderngl.CULL_FACE)
                 array.render(vertices=two_sided, first=one_sided)
+        if self._curved:
+            self._draw_curves(target.size, frame, window)
+
+    def _draw_curves(
+        self,
+        size: tuple[int, int],
+        frame: CameraFrame,
+        window: tuple[float, float, float, float],
+    ) -> None:
+        """Draw every curved light that shows a side, one triangle each."""
+        self._ctx.disable(moderngl.CULL_FACE)
+        program = self._programs.get(CURVED_LIGHTS)
+        self._outlines.bind(program, OUTLINE_UNIT)
+        set_uniform(program, "clip_window", window)
+        set_uniform(program, "middle", (0.5 * size[0], 0.5 * size[1]))
+        clip_from_world = frame.clip_from_world()
+        for shape in self._curved:
+            side = shape.faces(frame.eye)
+            if not (side > 0.0 or (side < 0.0 and shape.two_sided)):
+                continue
+            corners = clip_from_world @ np.vstack([shape.corners().T, np.ones(3)])
+            write_uniform(program, "clip_corners", corners)
+            write_uniform(program, "box_from_pixel", shape.box_from_pixel(frame, window, size))
+            set_uniform(program, "normal_ws", tuple(side * shape.normal))
+            set_uniform(program, "light_id", float(shape.id))
+            set_uniform(program, "first_texel", shape.first)
+            set_uniform(program, "band_count", shape.bands)
+            self._triangle.draw(program)
 
     def allocated(self) -> dict[str, int]:
         """Return the bytes of every buffer held, by name."""
         held = {f"mesh {name}": vertices.bytes for name, (_, vertices) in self._meshes.items()}
         if self._shapes is not None:
             held["light shapes"] = self._shapes.bytes
+        if self._curved:
+            held["light curves"] = self._outlines.bytes
         return held
 
     def release(self) -> None:
@@ -246,3 +313,4 @@ class GBufferPass:
         if self._shapes is not None:
             self._shapes.release()
             self._shapes = None
+        self._drop_curves()

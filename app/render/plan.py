@@ -10,11 +10,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.errors import InputError
 from app.render import gbuffer
 from app.render.features import LightingFeatures, Limits
 from app.render.gbuffer import load_meshes, mesh_bytes, objects_spec
+from app.render.light_shapes import (
+    LIGHT_VERTEX,
+    curve_texels,
+    has_triangles,
+    pack_light_curves,
+    pack_light_triangles,
+)
 from app.render.lighting import lighting_spec
-from app.render.pack import LIGHT_VERTEX, TEXELS_PER_MATERIAL, pack_light_shapes
+from app.render.pack import TEXELS_PER_MATERIAL
 from app.render.post import display_spec
 from app.render.programs import ProgramSpec
 from app.render.storage import storage_bytes
@@ -66,14 +74,22 @@ def needs_of(
         If lights or objects are more than the machine can hold.
     """
     lighting = LightingFeatures.of(scene, samples, limits, technique)
+    outlines = curve_texels(scene.lights)
+    if outlines > limits.storage_texels:
+        raise InputError(
+            f"lights: the curves of visible lights need {outlines} records, "
+            f"expected at most {limits.storage_texels} on this machine"
+        )
     programs: list[ProgramSpec] = []
     attachments: list[str] = []
     if lighting.lit:
         attachments += ["gbuffer", *(["tangents"] if lighting.tangents else []), "depth"]
         if scene.objects:
             programs.append(objects_spec(lighting.tangents))
-        if lighting.shapes:
+        if has_triangles(scene.lights):
             programs.append(gbuffer.LIGHTS)
+        if outlines:
+            programs.append(gbuffer.CURVED_LIGHTS)
         programs.append(lighting_spec(lighting))
     attachments.append("radiance")
     if lighting.lit and lighting.accumulates:
@@ -258,11 +274,21 @@ def _buffers(scene: Scene, features: LightingFeatures) -> tuple[PlannedResource,
     for name, mesh in load_meshes(scene.objects).items():
         form = f"vertices and indices, {len(mesh.indices)} triangles"
         parts.append(PlannedResource(f"mesh {name}", form, mesh_bytes(mesh, features.tangents)))
-    if features.shapes:
-        vertices = len(pack_light_shapes(scene.lights).vertices)
+    if has_triangles(scene.lights):
+        vertices = len(pack_light_triangles(scene.lights).vertices)
         parts.append(
             PlannedResource(
                 "light shapes", f"{vertices // 3} triangles", vertices * LIGHT_VERTEX.itemsize
+            )
+        )
+    if curve_texels(scene.lights):
+        outlines, shapes = pack_light_curves(scene.lights)
+        bands = sum(shape.bands for shape in shapes)
+        parts.append(
+            PlannedResource(
+                "light curves",
+                f"RGBA32F texture, {_count(len(shapes), 'outline')} in {_count(bands, 'band')}",
+                storage_bytes(len(outlines), 0),
             )
         )
     parts.append(_storage("lights", lights.texels, lights.uniform_texels))
@@ -296,7 +322,7 @@ def _passes(shot: Shot, features: LightingFeatures) -> tuple[str, ...]:
                 lobes.remove("diffuse")
             does.append(
                 f"{' and '.join(lobes)} of {_count(features.lights.count, 'light')} "
-                f"with {_count(features.lights.edges, 'edge')}"
+                f"with {_count(features.lights.parts, features.lights.part_name)}"
             )
         if features.shapes:
             does.append("the radiance of visible lights")
@@ -349,7 +375,11 @@ def _left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
     if not features.shades and features.lit:
         leave("material records", dark or "no material reflects anything")
     if features.lit and not features.shapes:
-        leave("light-shape program and triangles", "no light is visible")
+        leave("light-shape programs, triangles and curves", "no light is visible")
+    elif features.lit and not curve_texels(scene.lights):
+        leave("light-curve program and outlines", "no visible light has curves")
+    elif features.lit and not has_triangles(scene.lights):
+        leave("light-shape program and triangles", "every visible light has curves")
     if features.shades and not lights.two_sided:
         leave("light from back sides", "no light is two-sided")
     if features.shades and not lights.one_sided:

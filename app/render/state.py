@@ -69,7 +69,7 @@ def release_framebuffer(framebuffer: moderngl.Framebuffer) -> None:
 
 
 class FullScreenTriangle:
-    """Runs a fragment shader over a whole target: three vertices and no buffer."""
+    """Three vertices and no buffer: runs a fragment shader over a whole target, as a rule."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
@@ -77,7 +77,7 @@ class FullScreenTriangle:
         self._program: moderngl.Program | None = None
 
     def draw(self, program: moderngl.Program) -> None:
-        """Draw with ``program``, whose vertex shader is ``passes/fullscreen.vert``."""
+        """Draw with ``program``, whose vertex shader places the corners by gl_VertexID."""
         if self._array is None or self._program is not program:
             self.release()
             self._array = self._ctx.vertex_array(program, [])
