@@ -10,6 +10,9 @@
 #include "ltc/polygon.glsl"
 #if HAS_CURVES
 #include "ltc/curve.glsl"
+#if CURVE_RULE
+#include "ltc/adaptive.glsl"
+#endif
 #endif
 
 struct Contour {
@@ -208,7 +211,11 @@ bool contour_part(
         contour.next = after;
         return false;
     }
+#if CURVE_RULE
+    bool is_chord = about.w == 0.0;
+#else
     bool is_chord = integral_bound(bound, about.xyz, abs(about.w)) <= CHORD_ERROR;
+#endif
     if (is_inner && !is_chord) {
         ++contour.next;
         return false;
@@ -231,7 +238,8 @@ bool contour_part(
     part.to = next_crossing(z, part.from, 1.0, above);
     if (part.to < 1.0) {
         meet_horizon(contour, curve_point(power_curve(part.curve), part.to), above);
-        contour.from = part.to;
+        // Not 0 again, which would be the curve's start.
+        contour.from = max(part.to, 1e-7);
         contour.above = !above;
     } else {
         contour.from = 0.0;
@@ -252,7 +260,11 @@ float light_form_factor(
         ContourPart part;
         if (contour_part(light, transformed, bound, contour, part)) {
             if (part.is_curve) {
+#if CURVE_RULE
+                add_divided_curve(transformed, part.curve, part.from, part.to, sum);
+#else
                 add_curve(transformed, part.curve, part.from, part.to, sum);
+#endif
             } else {
                 add_edge(transformed, part.edge, sum);
             }
