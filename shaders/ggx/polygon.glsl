@@ -228,6 +228,91 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
     return true;
 }
 
+#if HAS_CURVES
+// Upper bound of the lobe's integral over an area [m^2] inside a disc (center, radius) about
+// the light's origin: GGX's density |h|^4 / (2 pi ax ay (|bent| + bent.z) |h'|^4), h = v + o,
+// times depth / distance^3.
+float ggx_integral_bound(GgxLight about, GgxView view, float depth, vec3 disc, float area)
+{
+    vec2 at = disc.xy - about.placed.anchor;
+    vec3 r = about.placed.center + at.x * about.placed.u + at.y * about.placed.v;
+    float distance = length(r);
+    float nearest = max(distance - disc.z, abs(depth));
+    // No direction to the disc is farther than this from the one to its center.
+    float spread = min(2.0 * disc.z / nearest, 2.0);
+    vec3 h = view.wo + r / max(distance, 1e-30);
+    float longest = min(length(h) + spread, 2.0);
+    // Along and across the surface, h' = h / (ax, ay, 1) is at least so long.
+    vec2 sides = max(abs(h.xy) - spread, 0.0) * view.inverse_alpha.xy;
+    float shortest2 = max(dot(sides, sides) + max(h.z - spread, 0.0) * max(h.z - spread, 0.0),
+                          view.wo.z * view.wo.z);
+    float longest2 = longest * longest;
+    float density = 0.159154943 * view.inverse_alpha.x * view.inverse_alpha.y *
+                    longest2 * longest2 /
+                    ((view.bent_length + view.bent.z) * shortest2 * shortest2);
+    return area * density * abs(depth) / (nearest * nearest * nearest);
+}
+
+// The next edge: a chord of the tree, or of a piece of a curve so short that what lies
+// between does not matter. Pieces of a leaf are as good as parabolas: half of one has an
+// eighth of the area.
+bool ggx_contour_edge(
+    PlanarLight light, GgxLight about, GgxView view, float depth, inout Contour contour,
+    out PlanarEdge edge)
+{
+    if (contour.closing) {
+        edge = closing_edge(contour);
+        return true;
+    }
+    ContourNode node;
+    if (!contour_node(light, about.placed, contour, node)) {
+        return false;
+    }
+    float scale = exp2(-float(contour.halvings));
+    vec3 disc = node.disc;
+    PlanarEdge whole;
+    PowerCurve curve;
+    if (contour.halvings > 0) {
+        whole = node_chord(light, about.placed, contour);
+        curve = power_curve(PlanarCurve(whole.a, whole.d, node.handles.xy, node.handles.zw));
+        edge = piece_chord(whole, curve, contour.piece, scale);
+        disc = vec3(0.5 * (edge.a + edge.b) + about.placed.anchor, length(edge.d));
+    }
+    bool is_chord = contour.halvings == MOST_CHORD_HALVINGS ||
+                    ggx_integral_bound(about, view, depth, disc,
+                                       node.area * scale * scale * scale) <= CHORD_ERROR;
+    if (!is_chord) {
+        contour.next += node.is_inner ? 1 : 0;
+        contour.halvings += node.is_inner ? 0 : 1;
+        contour.piece *= 2;
+        return false;
+    }
+    if (contour.halvings == 0) {
+        edge = node_chord(light, about.placed, contour);
+        contour.next = node.after;
+    } else {
+        // After the second half of a piece comes the one it is half of.
+        ++contour.piece;
+        while ((contour.piece & 1) == 0 && contour.halvings > 0) {
+            contour.piece >>= 1;
+            --contour.halvings;
+        }
+        if (contour.halvings == 0) {
+            contour.piece = 0;
+            contour.next = node.after;
+        }
+    }
+    return clip_edge(contour, edge);
+}
+#else
+bool ggx_contour_edge(
+    PlanarLight light, GgxLight about, GgxView view, float depth, inout Contour contour,
+    out PlanarEdge edge)
+{
+    return contour_edge(light, about.placed, contour, edge);
+}
+#endif
+
 #if GGX_NODES > 1
 // Nodes that wait for the fan's centre; with more, all edges are computed again.
 const int STORED_NODES = 12 * GGX_NODES;
@@ -256,7 +341,7 @@ vec2 ggx_light_specular(
         Contour contour = contour_start(light, plane, about.placed, normal);
         while (!contour_ends(light, contour)) {
             PlanarEdge planar;
-            if (!contour_edge(light, about.placed, contour, planar)) {
+            if (!ggx_contour_edge(light, about, view, plane.depth, contour, planar)) {
                 continue;
             }
             if (pinned) {

@@ -28,6 +28,8 @@ struct Contour {
 #if HAS_CURVES
     float from;        // where on the curve at `next` to go on, 0 at its start
     bool above;        // whether the curve is above the surface there
+    int piece;         // the same for techniques that take curves in 2^halvings chords
+    int halvings;
 #endif
 };
 
@@ -38,7 +40,7 @@ Contour contour_start(PlanarLight light, PlaneView view, CosineLight anchored, v
                                     : view.depth * dot(normal, light.n);
     return Contour(slope, base, vec2(0.0), false, false, vec2(0.0), vec2(0.0), 0
 #if HAS_CURVES
-                   , 0.0, false
+                   , 0.0, false, 0, 0
 #endif
     );
 }
@@ -178,6 +180,46 @@ float integral_bound(LobeBound bound, vec3 disc, float area)
     return top <= 0.0 ? 0.0 : area * bound.scale * top / (near2 * near2);
 }
 
+// A node of the outline's tree.
+struct ContourNode {
+    vec3 disc;      // around it and its chord: center about the light's origin, radius
+    float area;     // at least between it and its chord
+    bool is_inner;
+    int after;      // the node after its subtree
+    vec4 handles;   // of leaves
+};
+
+// The node where the walk is; false if none of it is above the surface.
+bool contour_node(
+    PlanarLight light, CosineLight anchored, inout Contour contour, out ContourNode node)
+{
+    int texel = light.first_part + 4 * contour.next;
+    vec4 about = light_texel(texel + 2);
+    node.disc = about.xyz;
+    node.area = abs(about.w);
+    node.is_inner = about.w < 0.0;
+    node.handles = light_texel(texel + 3);
+    node.after = node.is_inner ? int(node.handles.x) : contour.next + 1;
+    vec2 at = about.xy - anchored.anchor;
+    float steepness = length(contour.slope);
+    float highest = height_of(contour, at) + about.z * steepness;
+    // Safely below: ends that are shared with other nodes must not be judged differently.
+    float margin = 1e-5 * (abs(contour.base) + steepness * (length(at) + about.z));
+    if (highest < -margin) {
+        contour.next = node.after;
+        return false;
+    }
+    return true;
+}
+
+// The chord of the node where the walk is, or of its curve.
+PlanarEdge node_chord(PlanarLight light, CosineLight anchored, Contour contour)
+{
+    int texel = light.first_part + 4 * contour.next;
+    return planar_edge(
+        light_texel(texel), light_texel(texel + 1), anchored.anchor, anchored.anchor_low);
+}
+
 // A straight or curved part of the outline about the anchor, above the surface.
 struct ContourPart {
     PlanarEdge edge;
@@ -197,41 +239,25 @@ bool contour_part(
         part.edge = closing_edge(contour);
         return true;
     }
-    int texel = light.first_part + 4 * contour.next;
-    vec4 about = light_texel(texel + 2);
-    vec4 inside = light_texel(texel + 3);
-    bool is_inner = about.w < 0.0;
-    int after = is_inner ? int(inside.x) : contour.next + 1;
-    vec2 at = about.xy - anchored.anchor;
-    float steepness = length(contour.slope);
-    float highest = height_of(contour, at) + about.z * steepness;
-    // Safely below: ends that are shared with other nodes must not be judged differently.
-    float margin = 1e-5 * (abs(contour.base) + steepness * (length(at) + about.z));
-    if (highest < -margin) {
-        contour.next = after;
+    ContourNode node;
+    if (!contour_node(light, anchored, contour, node)) {
         return false;
     }
-#if CURVE_RULE
-    bool is_chord = about.w == 0.0;
-#else
-    bool is_chord = integral_bound(bound, about.xyz, abs(about.w)) <= CHORD_ERROR;
-#endif
-    if (is_inner && !is_chord) {
+    bool is_chord = integral_bound(bound, node.disc, node.area) <= CHORD_ERROR;
+    if (node.is_inner && !is_chord) {
         ++contour.next;
         return false;
     }
-    vec4 ends = light_texel(texel);
-    vec4 ends_low = light_texel(texel + 1);
-    part.edge = planar_edge(ends, ends_low, anchored.anchor, anchored.anchor_low);
+    part.edge = node_chord(light, anchored, contour);
     if (is_chord) {
-        contour.next = after;
+        contour.next = node.after;
         return clip_edge(contour, part.edge);
     }
     part.is_curve = true;
-    part.curve = PlanarCurve(part.edge.a, part.edge.d, inside.xy, inside.zw);
-    vec4 z = vec4(height_of(contour, part.edge.a),
-                  height_of(contour, part.edge.a + inside.xy),
-                  height_of(contour, part.edge.b + inside.zw),
+    vec2 a = part.edge.a;
+    part.curve = PlanarCurve(a, part.edge.d, node.handles.xy, node.handles.zw);
+    vec4 z = vec4(height_of(contour, a), height_of(contour, a + node.handles.xy),
+                  height_of(contour, part.edge.b + node.handles.zw),
                   height_of(contour, part.edge.b));
     part.from = contour.from;
     bool above = contour.from > 0.0 ? contour.above : z.x > 0.0;
@@ -243,9 +269,32 @@ bool contour_part(
         contour.above = !above;
     } else {
         contour.from = 0.0;
-        contour.next = after;
+        contour.next = node.after;
     }
     return above;
+}
+
+// Chords of a curve are 2^-10 of it at least.
+const int MOST_CHORD_HALVINGS = 10;
+
+// The chord of the piece of a leaf where the walk is. `scale`: the share of the leaf that pieces
+// of this size are.
+PlanarEdge piece_chord(PlanarEdge whole, PowerCurve curve, int piece, float scale)
+{
+    float from = scale * float(piece);
+    float to = scale * float(piece + 1);
+    PlanarEdge edge;
+    // `precise`: what ends here and what starts here must agree to the bit.
+    precise vec2 a = curve_point(curve, from);
+    precise vec2 b = curve_point(curve, to);
+    edge.a = piece == 0 ? whole.a : a;
+    edge.b = to == 1.0 ? whole.b : b;
+    // b - a, without its cancellation.
+    float h = to - from;
+    edge.d = h * (curve.c1 + (to + from) * curve.c2 +
+                  (to * to + to * from + from * from) * curve.c3);
+    edge.moment = cross_2d(edge.a, edge.d);
+    return edge;
 }
 
 // Form factor, under the transform, of the part of a light above the surface.
