@@ -138,19 +138,15 @@ def project(camera: Camera, point: Vec3, width: float, height: float) -> Vec3 | 
     return (x, y, depth)
 
 
-def project_all(
-    camera: Camera, points: FloatArray, width: float, height: float
-) -> FloatArray | None:
-    """Return (n, 2) pixels of (n, 3) points; None if one of them is not in front of the eye."""
+def project_all(camera: Camera, points: FloatArray, width: float, height: float) -> FloatArray:
+    """Return (..., 3) pixels and depths [m] of (..., 3) points; NaN where not before the eye."""
     axes = basis_of(camera)
     local = (points - np.array(camera.eye)) @ np.array([axes.right, axes.up, axes.forward]).T
-    depth = local[:, 2]
-    if (depth < NEAR).any():
-        return None
+    depth = np.where(local[..., 2] < NEAR, np.nan, local[..., 2])
     focal = 0.5 * height / math.tan(camera.fov_y / 2.0)
-    x = 0.5 * width + focal * local[:, 0] / depth
-    y = 0.5 * height - focal * local[:, 1] / depth
-    return np.stack([x, y], axis=-1)
+    x = 0.5 * width + focal * local[..., 0] / depth
+    y = 0.5 * height - focal * local[..., 1] / depth
+    return np.stack([x, y, depth], axis=-1)
 
 
 def clip_to_view(camera: Camera, a: Vec3, b: Vec3) -> tuple[Vec3, Vec3] | None:

@@ -55,7 +55,7 @@ UNEQUAL = 1e-3
 BENT = 0.25
 """Where on its chord a bent line gets its handles: off the thirds, so that it counts as a curve."""
 
-MOST_PIECES = 256
+MOST_PIECES = 1024
 """Into how many pieces `flatten` cuts a curve at most."""
 
 

@@ -10,12 +10,28 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app import contours
 from app.lights import bounds_of, move_light, regular_polygon
-from app.scene import AreaLight, Material, Outline, Plane, Scene, SceneObject, Transform
+from app.presets import PRESETS
+from app.scene import (
+    AreaLight,
+    Camera,
+    Material,
+    Outline,
+    OutlineSource,
+    Plane,
+    Scene,
+    SceneObject,
+    SvgSource,
+    TextSource,
+    Transform,
+)
+from app.sources import outline_from
 from app.vectors import (
     add,
     cross,
@@ -69,10 +85,20 @@ def replace_material(scene: Scene, name: str, material: Material) -> Scene:
     return replace(scene, materials=materials, objects=objects)
 
 
-def add_light(scene: Scene) -> tuple[Scene, int]:
-    """Add a quad above and behind the camera's target, facing it; return the scene and its index.
+def add_light(
+    scene: Scene,
+    outline: Outline | None = None,
+    name: str = "light",
+    source: OutlineSource | None = None,
+) -> tuple[Scene, int]:
+    """Add a light above and behind the camera's target, facing it; return the scene and its index.
 
-    Its size follows the distance at which one looks.
+    Parameters
+    ----------
+    outline : Outline, optional
+        In metres, upright as it is seen; a square of `new_size` if there is none.
+    source : OutlineSource, optional
+        What the outline was made from.
     """
     camera = scene.camera
     up = normalize(camera.up)
@@ -80,17 +106,60 @@ def add_light(scene: Scene) -> tuple[Scene, int]:
     distance = length(away)
     flat = normalize(subtract(away, scale(up, dot(away, up))))
     origin = add(camera.target, add(scale(up, 0.22 * distance), scale(flat, 0.35 * distance)))
-    half = 0.16 * distance
-    right = normalize(cross(flat, up))
     normal = normalize(subtract(camera.target, origin))
-    across = scale(right, -1.0)
+    right = normalize(cross(flat, up))
+    if outline is None:
+        outline = Outline((regular_polygon(4, new_size(camera) / math.sqrt(2.0)),))
     light = AreaLight(
-        name=unique_name("light", (light.name for light in scene.lights)),
-        outline=Outline((regular_polygon(4, half * math.sqrt(2.0)),)),
-        plane=Plane(origin, across, cross(normal, across)),
+        name=unique_name(name, (light.name for light in scene.lights)),
+        outline=outline,
+        plane=Plane(origin, right, cross(normal, right)),
         radiance=(5.0, 5.0, 5.0),
+        source=source,
     )
     return replace(scene, lights=(*scene.lights, light)), len(scene.lights)
+
+
+def new_size(camera: Camera) -> float:
+    """Return the longer side [m] of a new light: a third of the distance at which one looks."""
+    return 0.32 * length(subtract(camera.target, camera.eye))
+
+
+def add_preset(scene: Scene, name: str) -> tuple[Scene, int]:
+    """Add a light of one of `app.presets.PRESETS`, of `new_size`; return its index."""
+    outline = PRESETS[name]()
+    boxes = np.array([contours.bounds(contour) for contour in outline.contours])
+    low, high = boxes[:, 0].min(0), boxes[:, 1].max(0)
+    factor = new_size(scene.camera) / float((high - low).max())
+    shift = -0.5 * factor * (low + high)
+    fitted = tuple(
+        contours.transform(contour, factor * np.eye(2), shift) for contour in outline.contours
+    )
+    return add_light(scene, replace(outline, contours=fitted), name.lower())
+
+
+def add_text(scene: Scene, text: str = "Light", font: str = "") -> tuple[Scene, int]:
+    """Add a text as a light, in a font file or the program's own; return its index.
+
+    Raises
+    ------
+    InputError
+        If the font cannot be read or lacks a letter.
+    """
+    source = TextSource(text, font, size=0.6 * new_size(scene.camera))
+    return add_light(scene, outline_from(source), "text", source)
+
+
+def add_drawing(scene: Scene, path: str) -> tuple[Scene, int]:
+    """Add a drawing, an SVG file by its absolute path, as a light; return its index.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    source = SvgSource(path, size=1.25 * new_size(scene.camera))
+    return add_light(scene, outline_from(source), Path(path).stem, source)
 
 
 def add_object(

@@ -23,6 +23,7 @@ from app.scene import (
     AreaLight,
     BezierContour,
     Contour,
+    FillRule,
     Plane,
     PolygonContour,
     SceneError,
@@ -48,6 +49,9 @@ Hole: TypeAlias = Literal["square", "round"]
 
 FINE = 1e-3
 """How far `widest_place` and `bounds_of` may miss a curve, in sizes of the outline."""
+
+FINENESS = {"coarse": 1e-2, "medium": 1e-3, "fine": 1e-4}
+"""How far polygons made of curves may miss them, in sizes of the light; for `to_polygon`."""
 
 
 def vertices_of(light: AreaLight) -> list[tuple[Vertex, Vec2]]:
@@ -264,6 +268,11 @@ def to_polygon(light: AreaLight, fineness: float, contour: int | None = None) ->
     metric = metric_from_plane(light.plane)
     tolerance = fineness * size_of(light)
     return _with_each(light, contour, lambda old: contours.to_polygon(old, tolerance, metric))
+
+
+def set_fill_rule(light: AreaLight, rule: FillRule) -> AreaLight:
+    """Decide anew what is inside where contours overlap."""
+    return replace(light, outline=replace(light.outline, fill_rule=rule), source=None)
 
 
 def size_of(light: AreaLight) -> float:

@@ -21,6 +21,9 @@ _FIELD_NAMES = {
     "rotate": "rotation",
     "translate": "position",
     "outline": "shape",
+    "align": "alignment",
+    "line_height": "line height",
+    "path": "drawing",
 }
 
 
@@ -41,6 +44,8 @@ def describe(before: Scene, after: Scene) -> str:
             if a.name != b.name:
                 return f"Rename {kind} '{a.name}'"
             if isinstance(a, AreaLight) and isinstance(b, AreaLight):
+                if b.source is not None and (a.source, a.outline) != (b.source, b.outline):
+                    return _change_of_source(a, b)
                 more = len(b.outline.contours) - len(a.outline.contours)
                 if more:
                     return f"{'Add' if more > 0 else 'Remove'} outline of '{a.name}'"
@@ -48,6 +53,14 @@ def describe(before: Scene, after: Scene) -> str:
     if before.display != after.display:
         return f"Change {_first_difference(before.display, after.display)}"
     return "Move camera"
+
+
+def _change_of_source(a: AreaLight, b: AreaLight) -> str:
+    """Name the difference of two lights of which the later one is made from something."""
+    if type(a.source) is not type(b.source):
+        return f"Make '{a.name}' anew"
+    changed = _first_difference(a.source, b.source) if a.source != b.source else ""
+    return f"Change {changed} of '{a.name}'" if changed else f"Reload '{a.name}'"
 
 
 def _lists_of(before: Scene, after: Scene) -> tuple[tuple[str, _Items, _Items], ...]:

@@ -31,6 +31,7 @@ from app.gui.beginning import first_scene, first_selection
 from app.gui.dialogs import FileDialogs
 from app.gui.documents import Documents
 from app.gui.exports import Exports
+from app.gui.imports import Imports
 from app.gui.keyboard import act_on_keys
 from app.gui.layout import TITLE, docking, runner_params
 from app.gui.menus import edit_menu, file_menu, view_menu
@@ -71,10 +72,13 @@ class Window:
         self.editor.selection = first_selection(scene)
         self.messages = Messages()
         self.dialogs = FileDialogs()
-        self.documents = Documents(self.editor, self.messages, self.dialogs, self.show)
+        self.imports = Imports(self.editor, self.messages, self.dialogs)
+        self.documents = Documents(
+            self.editor, self.messages, self.dialogs, self.imports, self.show
+        )
         self.dropped: list[str] = []
         self.title = ""
-        self._panels = PanelWindows(self.editor)
+        self._panels = PanelWindows(self.editor, self.imports)
         self._reports = Reports()
         self._actions = self._what_actions_do()
         self.params = runner_params()
@@ -134,6 +138,12 @@ class Window:
             "overlays": lambda: self.viewport.toggle_overlays(),
             "move": lambda: self.viewport.take("move"),
             "rotate": lambda: self.viewport.take("rotate"),
+            "corner": lambda: self.viewport.outline.set_kind(self.editor, "corner"),
+            "smooth": lambda: self.viewport.outline.set_kind(self.editor, "smooth"),
+            "symmetric": lambda: self.viewport.outline.set_kind(self.editor, "symmetric"),
+            "line": lambda: self.viewport.outline.straighten(self.editor),
+            "curve": lambda: self.viewport.outline.bend(self.editor),
+            "reverse": lambda: self.viewport.outline.reverse(self.editor),
         }
         return {name: self._guarded(action) for name, action in actions.items()}
 

@@ -18,7 +18,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_4 as icons
 from imgui_bundle import portable_file_dialogs as system_dialogs
 
-from app.gui.documents import FileType
+from app.gui.file_types import FileType
 from app.panels.widgets import MUTED, begin_modal, button, hint, label
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")

@@ -8,34 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
-from app import edits
-from app.editor import Editor, Selection
+from app.editor import Editor
 from app.gui.beginning import new_scene
+from app.gui.file_types import DRAWING_FILES, SCENE_FILES, FileChooser
+from app.gui.imports import Imports
 from app.gui.messages import Messages
-from app.meshes import MESH_SUFFIXES, load_mesh
-from app.scene import Scene, Transform
+from app.meshes import MESH_SUFFIXES
+from app.scene import Scene
 from app.scene_io import demo_scenes, load_scene, save_scene
-
-FileType: TypeAlias = tuple[str, tuple[str, ...]]
-"""A name for people, and the suffixes, such as ".json"."""
-
-SCENE_FILES: FileType = ("Scenes", (".json",))
+from app.sources import font_suffixes
 
 Answer: TypeAlias = Literal["save", "discard", "cancel"]
-
-
-class FileChooser(Protocol):
-    """Asks for the name of a file, and goes on with ``then`` unless cancelled."""
-
-    def ask_open(
-        self, title: str, kind: FileType, folder: Path, then: Callable[[Path], None]
-    ) -> None: ...
-
-    def ask_save(
-        self, title: str, kind: FileType, proposal: Path, then: Callable[[Path], None]
-    ) -> None: ...
 
 
 class Documents:
@@ -49,6 +34,8 @@ class Documents:
         Gets what was done and what failed.
     chooser : FileChooser
         Asks for file names.
+    imports : Imports
+        Adds dropped files that are no scenes.
     show : callable
         Shows another scene, from a file or from None.
     """
@@ -58,11 +45,13 @@ class Documents:
         editor: Editor,
         messages: Messages,
         chooser: FileChooser,
+        imports: Imports,
         show: Callable[[Scene, Path | None], None],
     ) -> None:
         self._editor = editor
         self._messages = messages
         self._chooser = chooser
+        self._imports = imports
         self._show = show
         self._postponed: Callable[[], None] | None = None
 
@@ -152,27 +141,13 @@ class Documents:
     # --- dropped files --------------------------------------------------------
 
     def drop(self, names: Sequence[str]) -> None:
-        """Open dropped scenes, add dropped meshes."""
+        """Open dropped scenes, add dropped meshes, drawings and fonts."""
         for path in map(Path, names):
             if path.suffix.lower() == ".json":
                 self.open(path)
-            elif path.suffix.lower() in MESH_SUFFIXES:
-                self.add_mesh(path)
-            else:
+            elif not self._imports.take(path):
+                kinds = ", ".join((*MESH_SUFFIXES, *DRAWING_FILES[1], *font_suffixes()))
                 self._messages.failure(
-                    f"{path.name}: found '{path.suffix}', expected a scene (.json) or "
-                    f"a mesh ({', '.join(MESH_SUFFIXES)})"
+                    f"{path.name}: found '{path.suffix}', expected a scene (.json), or a mesh, "
+                    f"a drawing or a font ({kinds})"
                 )
-
-    def add_mesh(self, path: Path) -> None:
-        """Add a mesh file as an object, scaled to a metre if it is far from that."""
-        with self._messages.guard():
-            low, high = load_mesh(str(path.resolve())).bounds.astype(float)
-            extent = float((high - low).max())
-            factor = 1.0 if 0.1 <= extent <= 10.0 else 1.0 / max(extent, 1e-9)
-            place = Transform((0.0, -factor * float(low[1]), 0.0), scale=(factor,) * 3)
-            scene, index = edits.add_object(
-                self._editor.scene, str(path.resolve()), path.stem, place
-            )
-            self._editor.apply(f"Add '{path.stem}'", scene)
-            self._editor.selection = Selection.object(index)

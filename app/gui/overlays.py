@@ -7,17 +7,21 @@ from typing import Any
 
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
+from numpy.typing import NDArray
 
 from app import camera_control as control
 from app import contours, lights, planes
 from app.gui import theme
-from app.scene import AreaLight, Camera, Vec3
+from app.scene import AnchorKind, AreaLight, Camera, Contour, Plane, Vec2, Vec3
 from app.vectors import add, scale
+
+FloatArray = NDArray[np.float64]
 
 HANDLE = 9.0
 """Half the side of the square in which a corner can be grabbed, in points."""
-SHORTEST_EDGE = 56.0
-"""Length in points from which on an edge offers a point to add a corner."""
+
+FLAT = 0.1
+"""How far lines that stand for a curve may be from it on the screen, in points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +39,11 @@ class View:
         found = control.project(camera, point, self.width, self.height)
         return None if found is None else (self.x + found[0], self.y + found[1])
 
+    def project_all(self, camera: Camera, points: FloatArray) -> FloatArray:
+        """Return (..., 3) screen coordinates and depths [m]; NaN behind the eye."""
+        found = control.project_all(camera, points, self.width, self.height)
+        return np.asarray(found + np.array([self.x, self.y, 0.0]))
+
     def ray(self, camera: Camera, x: float, y: float) -> Vec3:
         """Return the direction of the ray through screen coordinates."""
         return control.ray_through(camera, x - self.x, y - self.y, self.width, self.height)
@@ -44,48 +53,74 @@ class View:
 
 
 @dataclass(frozen=True, slots=True)
-class Middle:
-    """The middle of an edge on the screen, and whether there is room for a handle."""
+class Sight:
+    """How the scene is seen: the picture's place, a camera, and the size of a point."""
 
-    contour: int
-    edge: int
-    at: tuple[float, float]
-    has_room: bool
+    view: View
+    camera: Camera
+    unit: float
+
+    def project(self, point: Vec3) -> tuple[float, float] | None:
+        """Return screen coordinates of a world point, None behind the eye."""
+        return self.view.project(self.camera, point)
+
+    def plane_point(self, plane: Plane, x: float, y: float) -> Vec2 | None:
+        """Return the plane coordinates under a place on the screen, None if it looks past."""
+        eye, direction = self.camera.eye, self.view.ray(self.camera, x, y)
+        hit = control.intersect_plane(eye, direction, plane.origin, planes.normal_of(plane))
+        return None if hit is None else planes.coordinates_on(plane, hit)
+
+    def piece_counts(self, curves: FloatArray, plane: Plane) -> NDArray[np.int64]:
+        """Return into how many lines to cut curves (n, 4, 2) of a plane so that none is seen.
+
+        By the depth of the nearest control point: nowhere on the curve is a
+        metre longer on the screen. What is off the screen stays whole.
+        """
+        screen = self.view.project_all(self.camera, on_plane(plane, curves))
+        focal = 0.5 * self.view.height / np.tan(0.5 * self.camera.fov_y)
+        nearest = np.nan_to_num(screen[..., 2], nan=control.NEAR).min(-1)
+        metric = planes.metric_from_plane(plane)
+        counts = contours.pieces(curves @ metric.T, FLAT * nearest / focal)
+        low, high = screen[..., :2].min(1), screen[..., :2].max(1)
+        corner = np.array([self.view.x, self.view.y])
+        size = np.array([self.view.width, self.view.height])
+        counts[((high < corner) | (low > corner + size)).any(-1)] = 1
+        return counts
+
+
+def on_plane(plane: Plane, points: FloatArray) -> FloatArray:
+    """Return the world positions (..., 3) of plane coordinates (..., 2)."""
+    return np.asarray(np.array(plane.origin) + points @ np.array([plane.u, plane.v]))
 
 
 @dataclass(frozen=True, slots=True)
 class Canvas:
-    """Where to draw, seen how: a draw list, the picture's place, a camera, the size of a point.
-
-    ``crowded`` makes corners smaller, for lights that have many.
-    """
+    """Where to draw, seen how. ``crowded`` makes points smaller, for lights that have many."""
 
     draw: imgui.ImDrawList
-    view: View
-    camera: Camera
-    unit: float
+    sight: Sight
     crowded: bool = False
+
+    @property
+    def unit(self) -> float:
+        return self.sight.unit
 
     def segment(self, a: Vec3, b: Vec3, ink: int, thickness: float) -> None:
         """Draw what is in front of the eye of a line between two world points."""
-        clipped = control.clip_to_view(self.camera, a, b)
+        clipped = control.clip_to_view(self.sight.camera, a, b)
         if clipped is not None:
-            ends = [self.view.project(self.camera, point) for point in clipped]
+            ends = [self.sight.project(point) for point in clipped]
             if ends[0] is not None and ends[1] is not None:
                 self.draw.add_line(ImVec2(*ends[0]), ImVec2(*ends[1]), ink, thickness)
 
     def outline(self, light: AreaLight, colour: ImVec4, alpha: float, thickness: float) -> None:
         """Draw a light's contours, with a dark rim that shows on bright lights."""
-        rim, ink = theme.u32(theme.grey(0.0), 0.35 * alpha), theme.u32(colour, alpha)
-        plane = light.plane
-        axes = np.array([plane.u, plane.v])
+        rim, ink = theme.u32(theme.grey(0.0), 0.55 * alpha), theme.u32(colour, alpha)
         for contour in light.outline.contours:
-            world = np.array(plane.origin) + contours.flatten(contour, 1e-3) @ axes
-            screen = control.project_all(self.camera, world, self.view.width, self.view.height)
-            if screen is not None:
-                points: list[Any] = [
-                    ImVec2(self.view.x + x, self.view.y + y) for x, y in screen.tolist()
-                ]
+            world = self._lines(contour, light.plane)
+            screen = self.sight.view.project_all(self.sight.camera, world)
+            if np.isfinite(screen).all():
+                points: list[Any] = [ImVec2(x, y) for x, y, _ in screen.tolist()]
                 closed = imgui.ImDrawFlags_.closed
                 self.draw.add_polyline(points, rim, thickness + 2.0, closed)
                 self.draw.add_polyline(points, ink, thickness, closed)
@@ -93,6 +128,11 @@ class Canvas:
             corners: list[Vec3] = [(x, y, z) for x, y, z in world.tolist()]
             for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
                 self.segment(a, b, ink, thickness)
+
+    def _lines(self, contour: Contour, plane: Plane) -> FloatArray:
+        """Return the world corners (n, 3) of lines that look like the contour."""
+        curves = contours.curves_of(contour)
+        return on_plane(plane, contours.subdivide(curves, self.sight.piece_counts(curves, plane)))
 
     def box(self, corners: list[Vec3]) -> None:
         """Draw the edges of a box; bits 1, 2, 4 of a corner's index are x, y, z."""
@@ -107,20 +147,60 @@ class Canvas:
         centre, radius = lights.bounds_of(light)
         tip = add(centre, scale(planes.normal_of(light.plane), 0.6 * radius))
         self.segment(centre, tip, theme.u32(theme.ACCENT, 0.5), 1.5)
-        at = self.view.project(self.camera, tip)
+        at = self.sight.project(tip)
         if at is not None:
             self.draw.add_circle_filled(ImVec2(*at), 3.0, theme.u32(theme.ACCENT, 0.8))
 
-    def corner(self, at: tuple[float, float], *, near: bool, chosen: bool, hidden: bool) -> None:
-        """Draw a corner: larger under the pointer, ringed when selected, dim when hidden."""
-        centre = ImVec2(*at)
+    def vertex(
+        self,
+        at: tuple[float, float],
+        kind: AnchorKind,
+        *,
+        near: bool,
+        chosen: bool,
+        hidden: bool,
+    ) -> None:
+        """Draw a corner or anchor: a diamond, a square if smooth, a disk if symmetric.
+
+        Larger under the pointer, ringed when selected, dim when hidden.
+        """
         radius = self.unit * (6.5 if near or chosen else 3.2 if self.crowded else 5.0)
         alpha = 0.4 if hidden and not (near or chosen) else 1.0
         fill = theme.ACCENT if chosen or near else theme.grey(0.97)
-        self.draw.add_circle_filled(centre, radius + 1.5, theme.u32(theme.grey(0.0), 0.6 * alpha))
-        self.draw.add_circle_filled(centre, radius, theme.u32(fill, alpha))
+        self._mark(at, kind, radius + 1.5, theme.u32(theme.grey(0.0), 0.75 * alpha))
+        self._mark(at, kind, radius, theme.u32(fill, alpha))
         if chosen:
-            self.draw.add_circle(centre, radius + 3.0, theme.u32(theme.ACCENT), 0, 1.5)
+            centre = ImVec2(*at)
+            self.draw.add_circle(centre, radius + 4.5, theme.u32(theme.grey(0.0), 0.6), 0, 3.0)
+            self.draw.add_circle(centre, radius + 4.5, theme.u32(theme.ACCENT), 0, 1.5)
+
+    def _mark(self, at: tuple[float, float], kind: AnchorKind, radius: float, ink: int) -> None:
+        """Fill the sign of a kind, of about equal area for each."""
+        x, y = at
+        if kind == "symmetric":
+            self.draw.add_circle_filled(ImVec2(x, y), radius, ink)
+        elif kind == "smooth":
+            r = 0.87 * radius
+            self.draw.add_rect_filled(ImVec2(x - r, y - r), ImVec2(x + r, y + r), ink)
+        else:
+            r = 1.22 * radius
+            self.draw.add_quad_filled(
+                ImVec2(x, y - r), ImVec2(x + r, y), ImVec2(x, y + r), ImVec2(x - r, y), ink
+            )
+
+    def handle(
+        self, anchor: tuple[float, float] | None, at: tuple[float, float], *, near: bool
+    ) -> None:
+        """Draw a handle: a ring, and the line to its anchor."""
+        dark, ink = theme.u32(theme.grey(0.0), 0.6), theme.u32(theme.grey(0.95), 0.9)
+        centre, radius = ImVec2(*at), self.unit * (4.5 if near else 3.4)
+        if anchor is not None:
+            self.draw.add_line(ImVec2(*anchor), centre, dark, 3.0)
+            self.draw.add_line(ImVec2(*anchor), centre, ink, 1.2)
+        self.draw.add_circle_filled(centre, radius + 2.0, dark)
+        self.draw.add_circle_filled(centre, radius, theme.u32(theme.grey(0.12)))
+        rim = theme.ACCENT if near else theme.grey(0.97)
+        self.draw.add_circle(centre, radius, theme.u32(rim), 0, 1.8)
 
     def middle(self, at: tuple[float, float], *, near: bool) -> None:
         """Draw the dot that adds a corner, a plus under the pointer."""
@@ -133,25 +213,6 @@ class Canvas:
             ink = theme.u32(theme.grey(0.1))
             draw.add_line(ImVec2(x - arm, y), ImVec2(x + arm, y), ink, 1.5)
             draw.add_line(ImVec2(x, y - arm), ImVec2(x, y + arm), ink, 1.5)
-
-
-def middles_of(view: View, camera: Camera, light: AreaLight) -> list[Middle]:
-    """Return the middles of a light's edges that are in front of the eye."""
-    found = []
-    for c, contour in enumerate(light.outline.contours):
-        world = [planes.point_on(light.plane, point) for point in contours.points_of(contour)]
-        for e, (a, b) in enumerate(zip(world, world[1:] + world[:1], strict=True)):
-            first, last = view.project(camera, a), view.project(camera, b)
-            at = view.project(camera, scale(add(a, b), 0.5))
-            if first is not None and last is not None and at is not None:
-                span = float(np.hypot(last[0] - first[0], last[1] - first[1]))
-                found.append(Middle(c, e, at, span >= SHORTEST_EDGE))
-    return found
-
-
-def is_near(at: tuple[float, float], mouse: ImVec2, unit: float) -> bool:
-    """Tell whether the pointer is where a handle can be grabbed."""
-    return max(abs(at[0] - mouse.x), abs(at[1] - mouse.y)) <= unit * HANDLE
 
 
 def help_line(view: View, text: str) -> None:

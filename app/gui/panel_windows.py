@@ -12,6 +12,7 @@ from dataclasses import replace
 from app import edits, step_names
 from app.editor import Editor
 from app.gui.beginning import first_material
+from app.gui.imports import Imports
 from app.panels.camera import camera_panel
 from app.panels.display import display_panel
 from app.panels.light import light_panel, rename_field
@@ -19,7 +20,7 @@ from app.panels.material import material_panel, object_panel
 from app.panels.scene_tree import scene_panel
 from app.panels.widgets import button, hint, name_field
 from app.render.techniques import AUTOMATIC, TECHNIQUES, find_technique, suited_technique
-from app.scene import Material, RenderSettings, Scene, SceneObject
+from app.scene import Material, RenderSettings, Scene, SceneObject, TextSource
 
 
 class PanelWindows:
@@ -29,13 +30,15 @@ class PanelWindows:
     their panels stay when something else is selected.
     """
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: Editor, imports: Imports) -> None:
         self._editor = editor
+        self._imports = imports
         self.begin(editor.scene)
 
     def begin(self, scene: Scene) -> None:
         """Forget what was looked at: another scene is shown now."""
         self._light = 0
+        self._is_new_text = False
         self._material = first_material(scene)
 
     def _stage(self, scene: Scene) -> None:
@@ -46,7 +49,11 @@ class PanelWindows:
     def scene(self) -> None:
         """Draw the list of everything."""
         editor = self._editor
-        scene, selection = scene_panel(editor.scene, editor.selection)
+        scene, selection = scene_panel(editor.scene, editor.selection, self._imports.ask_drawing)
+        if len(scene.lights) > len(editor.scene.lights):
+            self._is_new_text = selection.kind == "light" and isinstance(
+                scene.lights[selection.index].source, TextSource
+            )
         self._stage(scene)
         editor.selection = selection
 
@@ -62,7 +69,11 @@ class PanelWindows:
         light = scene.lights[index]
         chosen = selection.kind == "light" and selection.index == index
         named = edits.rename_light(scene, index, rename_field(light.name))
-        new = light_panel(light, selection.vertex if chosen else None, scene.camera.target)
+        focus, self._is_new_text = self._is_new_text, False
+        new = light_panel(
+            light, selection.vertex if chosen else None, scene.camera.target,
+            lambda: self._imports.ask_source(light), focus,
+        )  # fmt: skip
         self._stage(edits.replace_light(scene, index, new) if new != light else named)
 
     def material(self, settings: RenderSettings) -> None:

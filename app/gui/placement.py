@@ -77,11 +77,10 @@ def sphere_around(scene: Scene, selection: Selection) -> tuple[Vec3, float] | No
         for corner in box_corners(scene, index)
     ]
     if selection.kind == "none":
-        points += [
-            planes.point_on(light.plane, point)
-            for light in scene.lights
-            for _, point in lights.vertices_of(light)
-        ]
+        for light in scene.lights:
+            (s0, t0), (s1, t1) = lights.extent_of(light)
+            corners = ((s0, t0), (s1, t0), (s1, t1), (s0, t1))
+            points += [planes.point_on(light.plane, corner) for corner in corners]
     if not points:
         return None
     world = np.array(points)

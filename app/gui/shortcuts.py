@@ -23,6 +23,12 @@ Action: TypeAlias = Literal[
     "overlays",
     "move",
     "rotate",
+    "corner",
+    "smooth",
+    "symmetric",
+    "line",
+    "curve",
+    "reverse",
 ]
 
 KEYS: dict[Action, tuple[str, ...]] = {
@@ -41,8 +47,14 @@ KEYS: dict[Action, tuple[str, ...]] = {
     "overlays": ("H",),
     "move": ("W",),
     "rotate": ("E",),
+    "corner": ("Shift+C",),
+    "smooth": ("Shift+S",),
+    "symmetric": ("Shift+Y",),
+    "line": ("Shift+L",),
+    "curve": ("Shift+U",),
+    "reverse": ("Shift+R",),
 }
-"""The keys of every action; the first is the one that is shown."""
+"""The keys of every action; the first is the one that is shown. Outlines have Inkscape's."""
 
 WHILE_TYPING: frozenset[Action] = frozenset({"new", "open", "save", "save as", "export", "quit"})
 """What keys do also while text is typed; the others belong to the text then."""

@@ -21,12 +21,13 @@ from app import edits, lights, planes
 from app.editor import NOTHING, Editor, Selection
 from app.errors import InputError
 from app.gui import theme
-from app.gui.live_picture import LivePicture, Reporter
-from app.gui.overlays import HANDLE, Canvas, View, help_line, is_near, middles_of
+from app.gui.live_picture import LivePicture
+from app.gui.messages import Messages
+from app.gui.outline_tool import OutlineTool, Spot
+from app.gui.overlays import Canvas, Sight, View, help_line
 from app.gui.placement import box_corners, moved_by, name_of, pose_of, sphere_around
-from app.gui.shortcuts import key_of
 from app.render.renderer import Hit, Renderer
-from app.scene import AreaLight, Camera, RenderSettings, Scene, SceneError, Shot, Vec2
+from app.scene import Camera, RenderSettings, Scene, SceneError, Shot, Vec2
 from app.vectors import add, length, subtract
 
 STILL_SAMPLES = 32
@@ -34,23 +35,10 @@ STILL_SAMPLES = 32
 UNDER_STATUS_BAR = 1
 """Points by which hello_imgui's status bar covers the docked windows."""
 
-CROWD = 16
-"""Corners from which on they are drawn smaller."""
-MOST_HANDLES = 400
-"""Corners beyond this number get no handles: they would hide the light."""
 MOST_ASKED = 64
 """How many corners of a light are asked whether they are behind something."""
 ASKING = 0.004
 """Seconds per frame for asking."""
-
-
-@dataclass(frozen=True, slots=True)
-class CornerDrag:
-    """A corner under the pointer: which, and where in it the pointer took hold, in points."""
-
-    light: int
-    vertex: tuple[int, int]
-    grip: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,20 +57,20 @@ class Viewport:
     ----------
     renderer : Renderer
         Picks, and renders what `LivePicture` asks for.
-    reporter : Reporter
+    messages : Messages
         Gets the failures of rendering and editing.
     """
 
-    def __init__(self, renderer: Renderer, reporter: Reporter) -> None:
+    def __init__(self, renderer: Renderer, messages: Messages) -> None:
         self.settings = RenderSettings(samples=STILL_SAMPLES)
         self.tool = "move"
         self.show_overlays = True
         self.help = ""
         self.view = View(0.0, 0.0, 1.0, 1.0, (1, 1))
-        self.picture = LivePicture(renderer, reporter)
+        self.picture = LivePicture(renderer, messages)
+        self.outline = OutlineTool(messages)
         self._renderer = renderer
-        self._reporter = reporter
-        self._corner: CornerDrag | None = None
+        self._messages = messages
         self._gizmo: GizmoDrag | None = None
         self._gizmo_hovered = False
         self._unit = 1.0
@@ -131,7 +119,9 @@ class Viewport:
         """Draw one frame into the current Dear ImGui window."""
         self._place()
         if self.show_overlays and self._gizmo is None:
-            self._handles(editor)
+            self.outline.submit(editor, self._sight(editor.scene))
+        else:
+            self.outline.let_go()
         self._canvas(editor)
         scene = editor.scene
         self.picture.render(scene, self.camera_of(scene), self.settings, self.view.pixels)
@@ -145,6 +135,9 @@ class Viewport:
     def camera_of(self, scene: Scene) -> Camera:
         """Return the camera that the picture is seen with."""
         return control.widened(scene.camera, self.view.width / self.view.height)
+
+    def _sight(self, scene: Scene) -> Sight:
+        return Sight(self.view, self.camera_of(scene), self._unit)
 
     # --- where -----------------------------------------------------------------
 
@@ -189,12 +182,13 @@ class Viewport:
             if imgui.is_mouse_released(imgui.MouseButton_.left):
                 self._select(editor, io.mouse_pos.x, io.mouse_pos.y)
             elif imgui.is_mouse_released(imgui.MouseButton_.right):
-                self._asked = self._hit(io.mouse_pos.x, io.mouse_pos.y)
-                if self._asked is not None:
-                    imgui.open_popup("place")
+                self._ask(editor, io.mouse_pos.x, io.mouse_pos.y)
         self._place_menu(editor)
+        self.outline.segment_menu(editor)
         if hovered and imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
-            self._split_edge(editor, io.mouse_pos.x, io.mouse_pos.y)
+            spot = self._spot(editor, io.mouse_pos.x, io.mouse_pos.y)
+            if spot is not None:
+                self.outline.insert(editor, spot)
         self._hover(editor.scene, hovered and not active)
 
     def _navigate(self, editor: Editor, dx: float, dy: float) -> None:
@@ -222,8 +216,24 @@ class Viewport:
         self._renderer.ctx.screen.use()
         return hit
 
+    def _spot(self, editor: Editor, x: float, y: float) -> Spot | None:
+        """Return the place of the selected light's outline at the pointer, if it is shown."""
+        if not self.show_overlays:
+            return None
+        return self.outline.spot_at(editor, self._sight(editor.scene), x, y)
+
+    def _ask(self, editor: Editor, x: float, y: float) -> None:
+        """Open the menu of the outline, or else of the place, under a click."""
+        spot = self._spot(editor, x, y)
+        if spot is not None:
+            self.outline.ask_about(spot)
+            return
+        self._asked = self._hit(x, y)
+        if self._asked is not None:
+            imgui.open_popup("place")
+
     def _select(self, editor: Editor, x: float, y: float) -> None:
-        if self._edge_at(editor, x, y) is not None:
+        if self._spot(editor, x, y) is not None:
             return
         hit = self._hit(x, y)
         if hit is None:
@@ -244,7 +254,7 @@ class Viewport:
                 scene = edits.replace_light(editor.scene, editor.selection.index, aimed)
                 editor.apply(f"Aim '{light.name}'", scene)
             except SceneError as failure:
-                self._reporter.failure(str(failure))
+                self._messages.failure(str(failure))
         if imgui.menu_item_simple("Look here"):
             camera = editor.scene.camera
             shift = subtract(hit.position_ws, camera.target)
@@ -260,130 +270,12 @@ class Viewport:
             is_light = hit is not None and hit.kind == "light" and hit.index < len(scene.lights)
             self._hovered_light = hit.index if hit is not None and is_light else None
 
-    # --- corners -------------------------------------------------------------------
-
-    def _handles(self, editor: Editor) -> None:
-        light = editor.selected_light
-        if light is None:
-            self._corner = None
-            return
-        index, camera = editor.selection.index, self.camera_of(editor.scene)
-        vertices = lights.vertices_of(light)
-        if len(vertices) > MOST_HANDLES:
-            return
-        for vertex, point in vertices:
-            at = self.view.project(camera, planes.point_on(light.plane, point))
-            name = f"vertex {vertex[0]}.{vertex[1]}"
-            if at is not None and self._handle(name, at):
-                editor.selection = Selection.light(index, vertex)
-                self._begin_corner(editor, f"Move corner of '{light.name}'", vertex, at)
-            if at is not None:
-                self._corner_menu(editor, index, vertex)
-        for middle in middles_of(self.view, camera, light):
-            vertex = (middle.contour, middle.edge + 1)
-            grabbed = self._corner is not None and self._corner.vertex == vertex
-            name = f"edge {middle.contour}.{middle.edge}"
-            if (middle.has_room or grabbed) and self._handle(name, middle.at):
-                wider = lights.add_vertex(light, middle.contour, middle.edge)
-                self._begin_corner(editor, f"Add corner to '{light.name}'", vertex, middle.at)
-                editor.update(edits.replace_light(editor.scene, index, wider))
-                editor.selection = Selection.light(index, vertex)
-                break
-        self._drag_corner(editor)
-
-    def _handle(self, name: str, at: tuple[float, float]) -> bool:
-        """Submit an invisible button around a point and tell whether it was just pressed."""
-        if not self.view.contains(*at) and self._corner is None:
-            return False
-        half = self._unit * HANDLE
-        imgui.set_cursor_screen_pos(ImVec2(at[0] - half, at[1] - half))
-        buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
-        imgui.invisible_button(name, ImVec2(2.0 * half, 2.0 * half), buttons)
-        if imgui.is_item_hovered() or imgui.is_item_active():
-            imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
-        return imgui.is_item_activated() and imgui.is_mouse_down(imgui.MouseButton_.left)
-
-    def _begin_corner(
-        self, editor: Editor, name: str, vertex: tuple[int, int], at: tuple[float, float]
-    ) -> None:
-        mouse = imgui.get_io().mouse_pos
-        editor.begin(name)
-        grip = (at[0] - mouse.x, at[1] - mouse.y)
-        self._corner = CornerDrag(editor.selection.index, vertex, grip)
-
-    def _drag_corner(self, editor: Editor) -> None:
-        """Let the grabbed corner follow the pointer on the light's plane."""
-        drag = self._corner
-        if drag is None:
-            return
-        if not editor.is_dragging or not imgui.is_mouse_down(imgui.MouseButton_.left):
-            self._corner = None
-            return
-        io = imgui.get_io()
-        light = editor.scene.lights[drag.light]
-        if not (io.mouse_delta.x or io.mouse_delta.y):
-            return
-        camera, plane = self.camera_of(editor.scene), light.plane
-        direction = self.view.ray(
-            camera, io.mouse_pos.x + drag.grip[0], io.mouse_pos.y + drag.grip[1]
-        )
-        hit = control.intersect_plane(camera.eye, direction, plane.origin, planes.normal_of(plane))
-        if hit is not None:
-            moved = lights.move_vertex(light, drag.vertex, planes.coordinates_on(plane, hit))
-            editor.update(edits.replace_light(editor.scene, drag.light, moved))
-
-    def _edge_at(self, editor: Editor, x: float, y: float) -> tuple[int, int, float] | None:
-        """Return (contour, edge, how far along) of the selected light's outline at the pointer."""
-        light = editor.selected_light
-        if light is None:
-            return None
-        camera, plane = self.camera_of(editor.scene), light.plane
-        direction = self.view.ray(camera, x, y)
-        hit = control.intersect_plane(camera.eye, direction, plane.origin, planes.normal_of(plane))
-        if hit is None:
-            return None
-        contour, edge, along = lights.nearest_edge(light, planes.coordinates_on(plane, hit))
-        point = lights.point_along(light, contour, edge, along)
-        at = self.view.project(camera, planes.point_on(plane, point))
-        if at is None or math.dist(at, (x, y)) > self._unit * HANDLE:
-            return None
-        return contour, edge, along
-
-    def _split_edge(self, editor: Editor, x: float, y: float) -> None:
-        """Add a corner where the selected light's outline was double-clicked."""
-        found, light = self._edge_at(editor, x, y), editor.selected_light
-        if found is None or light is None:
-            return
-        contour, edge, along = found
-        index = editor.selection.index
-        wider = lights.add_vertex(light, contour, edge, along)
-        editor.apply(
-            f"Add corner to '{light.name}'", edits.replace_light(editor.scene, index, wider)
-        )
-        editor.selection = Selection.light(index, (contour, edge + 1))
-
-    def _corner_menu(self, editor: Editor, index: int, vertex: tuple[int, int]) -> None:
-        if imgui.begin_popup_context_item(f"corner {vertex[0]}.{vertex[1]}"):
-            light = editor.scene.lights[index]
-            chosen = None
-            if imgui.menu_item_simple("Remove corner", key_of("remove")):
-                chosen = lights.remove_vertex
-            if len(light.outline.contours) > 1 and imgui.menu_item_simple("Remove outline"):
-                chosen = _remove_outline
-            if chosen is not None:
-                try:
-                    scene = edits.replace_light(editor.scene, index, chosen(light, vertex))
-                    editor.apply(f"Remove corner of '{light.name}'", scene)
-                except SceneError as failure:
-                    self._reporter.failure(str(failure))
-            imgui.end_popup()
-
     # --- gizmo ---------------------------------------------------------------------
 
     def _manipulate(self, editor: Editor) -> None:
         """Move or turn what is selected with ImGuizmo."""
         selection, scene = editor.selection, editor.scene
-        if selection.kind == "none" or self._corner is not None:
+        if selection.kind == "none" or self.outline.is_dragging:
             self._gizmo, self._gizmo_hovered = None, False
             return
         view, camera = self.view, self.camera_of(scene)
@@ -417,16 +309,17 @@ class Viewport:
 
     def _overlays(self, editor: Editor) -> None:
         scene, chosen = editor.scene, editor.selection
-        camera = self.camera_of(scene)
-        view, draw = self.view, imgui.get_window_draw_list()
-        canvas = Canvas(draw, view, camera, self._unit)
+        view, draw, sight = self.view, imgui.get_window_draw_list(), self._sight(scene)
+        canvas = Canvas(draw, sight)
         high = ImVec2(view.x + view.width, view.y + view.height)
         draw.push_clip_rect(ImVec2(view.x, view.y), high, True)
         for index, light in enumerate(scene.lights):
             if chosen.kind == "light" and chosen.index == index:
                 canvas.outline(light, theme.ACCENT, 1.0, 1.8)
                 canvas.direction(light)
-                self._corners(editor, light, camera)
+                if self.is_settled:
+                    self._find_hidden(scene, index)
+                self.outline.draw(editor, sight, self._hidden)
             elif index == self._hovered_light:
                 canvas.outline(light, theme.ACCENT, 0.55, 1.5)
             elif not light.visible:
@@ -435,29 +328,6 @@ class Viewport:
             with contextlib.suppress(InputError):
                 canvas.box(box_corners(scene, chosen.index))
         draw.pop_clip_rect()
-
-    def _corners(self, editor: Editor, light: AreaLight, camera: Camera) -> None:
-        """Draw the handles of the selected light."""
-        vertices = lights.vertices_of(light)
-        draw, crowded = imgui.get_window_draw_list(), len(vertices) > CROWD
-        canvas = Canvas(draw, self.view, camera, self._unit, crowded)
-        if len(vertices) > MOST_HANDLES:
-            return
-        if self.is_settled:
-            self._find_hidden(editor.scene, editor.selection.index)
-        mouse = imgui.get_io().mouse_pos
-        for middle in middles_of(self.view, camera, light):
-            if middle.has_room:
-                canvas.middle(middle.at, near=is_near(middle.at, mouse, self._unit))
-        for vertex, point in vertices:
-            at = self.view.project(camera, planes.point_on(light.plane, point))
-            if at is not None:
-                canvas.corner(
-                    at,
-                    near=is_near(at, mouse, self._unit),
-                    chosen=editor.selection.vertex == vertex,
-                    hidden=vertex in self._hidden,
-                )
 
     def _find_hidden(self, scene: Scene, index: int) -> None:
         """Find out, a few at a time once nothing moves, which corners are behind something."""
@@ -479,10 +349,6 @@ class Viewport:
             )
             self._hidden = self._hidden | {vertex} if behind else self._hidden - {vertex}
         self._is_asking = bool(self._unasked)
-
-
-def _remove_outline(light: AreaLight, vertex: tuple[int, int]) -> AreaLight:
-    return lights.remove_contour(light, vertex[0])
 
 
 def _columns(matrix: np.ndarray) -> list[float]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from imgui_bundle import imgui
 
 from app import contours, lights, planes
+from app.panels.source import source_rows
 from app.panels.widgets import (
     button,
     checkbox,
@@ -21,35 +23,53 @@ from app.panels.widgets import (
     numbers,
     position,
     slider,
+    tooltip,
 )
-from app.scene import FILL_RULES, AreaLight, SceneError, Vec3
+from app.scene import (
+    ANCHOR_KINDS,
+    FILL_RULES,
+    AreaLight,
+    BezierContour,
+    Contour,
+    SceneError,
+    Vec3,
+)
 from app.vectors import add, cross, length, normalize, scale, subtract
 
 RADIANCE_MAX = 1000.0
 
 
 def light_panel(
-    light: AreaLight, vertex: tuple[int, int] | None = None, target: Vec3 = (0.0, 0.0, 0.0)
+    light: AreaLight,
+    vertex: tuple[int, int] | None = None,
+    target: Vec3 = (0.0, 0.0, 0.0),
+    ask_file: Callable[[], None] = lambda: None,
+    focus_text: bool = False,
 ) -> AreaLight:
     """Draw the panel and return the light as edited.
 
     Parameters
     ----------
     vertex : (contour, point), optional
-        The selected corner, whose coordinates are shown.
+        The selected corner or anchor, whose coordinates are shown.
     target : Vec3
         Where "Aim" aims: what the camera looks at.
+    ask_file : callable
+        Asks for another font or drawing for a light that is made from one.
+    focus_text : bool
+        Put the keyboard into the text of a text light.
 
     Raises
     ------
-    SceneError
-        If a button asks for what the light cannot do, after drawing.
+    SceneError, InputError
+        If the light cannot do what a control asks for, after drawing.
     """
     with identity(f"light {light.name}"):
         new = _emission(light)
-        new, failure = _shape(new, vertex)
+        new, failed_source = source_rows(new, ask_file, focus_text)
+        new, failed_shape = _shape(new, vertex)
         new, failed_aim = _placement(new, target)
-    failure = failure or failed_aim
+    failure = failed_source or failed_shape or failed_aim
     if failure is not None:
         raise failure
     return new
@@ -78,39 +98,102 @@ def _emission(light: AreaLight) -> AreaLight:
 
 
 def _shape(light: AreaLight, vertex: tuple[int, int] | None) -> tuple[AreaLight, SceneError | None]:
-    loops_now = light.outline.contours
-    corners = sum(map(contours.size_of, loops_now))
+    own = light.outline.contours
     heading("Shape")
-    loops = "1 outline" if len(loops_now) == 1 else f"{len(loops_now)} outlines"
-    hint(f"{corners} corners in {loops}")
-    failure = None
+    loops = "1 outline" if len(own) == 1 else f"{len(own)} outlines"
+    imgui.align_text_to_frame_padding()
+    hint(f"{_points_in_words(own)} in {loops}")
+    light = _conversion(light)
     width = half_width()
-    if button("Add hole", "Cut a square hole into the widest part", width=width):
-        try:
-            light = lights.add_hole(light)
-        except SceneError as error:
-            failure = error
+    if button("Add hole…###add hole", "Cut a hole into the widest part", width=width):
+        imgui.open_popup("holes")
+    light, failure = _new_hole(light)
     imgui.same_line()
-    last = len(loops_now) - 1
+    last = len(own) - 1
     if button("Remove hole", "Remove the outline added last", enabled=last > 0, width=width):
         light = lights.remove_contour(light, last)
-    if len(loops_now) > 1:
+    if len(own) > 1:
         rule = choice(
             "Fill rule", light.outline.fill_rule, FILL_RULES,
             "How overlapping outlines combine: even-odd alternates, "
             "nonzero fills wherever they wind",
         )  # fmt: skip
         if rule != light.outline.fill_rule:
-            light = replace(light, outline=replace(light.outline, fill_rule=rule))
+            light = lights.set_fill_rule(light, rule)
     if vertex is not None and vertex[0] < len(light.outline.contours):
-        contour, point = vertex
-        at = contours.points_of(light.outline.contours[contour])[point]
-        s, t = numbers(
-            "Corner", at, 0.01, "%.3f", f"Corner {contour}.{point} in the light's own coordinates"
-        )
-        if (s, t) != at:
-            light = lights.move_vertex(light, vertex, (s, t))
+        light = _vertex(light, vertex)
     return light, failure
+
+
+def _points_in_words(own: Sequence[Contour]) -> str:
+    """Return how many corners and anchors there are: "4 corners, 12 anchors"."""
+    counts = {"corner": 0, "anchor": 0}
+    for contour in own:
+        counts[lights.word_for_vertex(contour)] += contours.size_of(contour)
+    named = (f"{n} {word}{'' if n == 1 else 's'}" for word, n in counts.items() if n)
+    return ", ".join(named)
+
+
+def _conversion(light: AreaLight) -> AreaLight:
+    """Draw a button at the end of the row, and the menu that it opens."""
+    text = "Convert…"
+    width = imgui.calc_text_size(text).x + 2.0 * imgui.get_style().frame_padding.x
+    imgui.same_line()
+    right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
+    imgui.set_cursor_pos_x(right - width)
+    if button(f"{text}###convert", "Make curves of corners, or corners of curves"):
+        imgui.open_popup("convert")
+    if imgui.begin_popup("convert"):
+        if imgui.menu_item_simple("To curves"):
+            light = lights.to_bezier(light)
+        for name, fineness in lights.FINENESS.items():
+            tip = f"Within {100.0 * fineness:g} % of the light's size"
+            if imgui.menu_item_simple(f"To polygon, {name}", "", False, lights.is_curved(light)):
+                light = lights.to_polygon(light, fineness)
+            tooltip(tip)
+        imgui.end_popup()
+    return light
+
+
+def _new_hole(light: AreaLight) -> tuple[AreaLight, SceneError | None]:
+    """Draw the menu of holes."""
+    failure = None
+    if imgui.begin_popup("holes"):
+        try:
+            if imgui.menu_item_simple("Square hole"):
+                light = lights.add_hole(light, "square")
+            if imgui.menu_item_simple("Round hole"):
+                light = lights.add_hole(light, "round")
+        except SceneError as error:
+            failure = error
+        imgui.end_popup()
+    return light, failure
+
+
+def _vertex(light: AreaLight, vertex: tuple[int, int]) -> AreaLight:
+    """Draw the rows of the selected corner or anchor."""
+    number, point = vertex
+    contour = light.outline.contours[number]
+    at, kind = contours.points_of(contour)[point], contours.kinds_of(contour)[point]
+    word = lights.word_for_vertex(contour).capitalize()
+    place = f"{word} {number}.{point} in the light's own coordinates"
+    s, t = numbers(word, at, 0.01, "%.3f", place)
+    if (s, t) != at:
+        light = lights.move_vertex(light, vertex, (s, t))
+    if isinstance(contour, BezierContour):
+        before = (point - 1) % contours.size_of(contour)
+        for name, segment, which in (("Handle in", before, 2), ("Handle out", point, 1)):
+            handle = contours.handle_of(contour, segment, which)
+            s, t = numbers(
+                name, handle, 0.01, "%.3f", "Where the handle is, in the light's own coordinates"
+            )
+            if (s, t) != handle:
+                light = lights.move_handle(light, number, segment, which, (s, t))
+    chosen = choice(
+        "Kind", kind, ANCHOR_KINDS,
+        "How handles hang together: each for itself, in line, or in line and equally long",
+    )  # fmt: skip
+    return lights.set_kind(light, vertex, chosen) if chosen != kind else light
 
 
 def _placement(light: AreaLight, target: Vec3) -> tuple[AreaLight, SceneError | None]:

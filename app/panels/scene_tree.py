@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from imgui_bundle import ImVec2, ImVec4, imgui
@@ -10,16 +11,25 @@ from imgui_bundle import icons_fontawesome_4 as icons
 from app import edits
 from app.editor import Selection, duplicate_selected, remove_selected
 from app.panels.widgets import MUTED, button, hint, identity, tooltip
+from app.presets import PRESETS
 from app.scene import BUILT_IN_MESHES, AreaLight, Scene, Vec3
 from app.sliders import srgb_from_linear
 
 
-def scene_panel(scene: Scene, selection: Selection) -> tuple[Scene, Selection]:
-    """Draw the tree; return the scene as edited and what is selected now."""
+def scene_panel(
+    scene: Scene, selection: Selection, ask_drawing: Callable[[], None] = lambda: None
+) -> tuple[Scene, Selection]:
+    """Draw the tree; return the scene as edited and what is selected now.
+
+    ``ask_drawing`` asks for an SVG file to add as a light.
+    """
     new, chosen = scene, selection
     if _section("Lights", "Add a light above what you look at", "add light"):
-        new, index = edits.add_light(new)
-        chosen = Selection.light(index)
+        imgui.open_popup("shapes")
+    if imgui.begin_popup("shapes"):
+        new, index = _new_light(new, ask_drawing)
+        chosen = Selection.light(index) if index is not None else chosen
+        imgui.end_popup()
     if not scene.lights:
         hint("No lights yet: press + to add one.")
     for index, light in enumerate(scene.lights):
@@ -42,6 +52,21 @@ def scene_panel(scene: Scene, selection: Selection) -> tuple[Scene, Selection]:
             chosen = Selection.object(index) if picked else chosen
             new, chosen = _menu(new, chosen, Selection.object(index))
     return new, chosen
+
+
+def _new_light(scene: Scene, ask_drawing: Callable[[], None]) -> tuple[Scene, int | None]:
+    """Draw the menu of shapes; return the scene and the index of the light if one was added."""
+    if imgui.menu_item_simple("Square"):
+        return edits.add_light(scene)
+    for name in PRESETS:
+        if imgui.menu_item_simple(name):
+            return edits.add_preset(scene, name)
+    imgui.separator()
+    if imgui.menu_item_simple("Text…###new text"):
+        return edits.add_text(scene)
+    if imgui.menu_item_simple("SVG…###new drawing"):
+        ask_drawing()
+    return scene, None
 
 
 def _section(title: str, tip: str, add_id: str) -> bool:

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from app.editor import Selection
 from app.gui.shortcuts import key_of
 from app.panels.widgets import MUTED
-from app.scene import Scene
+from app.scene import BezierContour, Scene
 
 
 def help_line(scene: Scene, selection: Selection, tool: str) -> str:
@@ -15,7 +15,11 @@ def help_line(scene: Scene, selection: Selection, tool: str) -> str:
     if not scene.lights:
         return "Add a light with + in the Scene panel"
     if selection.kind == "light" and selection.vertex is not None:
+        contour = scene.lights[selection.index].outline.contours[selection.vertex[0]]
         removes = f"{key_of('remove')} removes it"
+        if isinstance(contour, BezierContour):
+            kinds = f"{key_of('smooth')} smooth, {key_of('corner')} corner"
+            return f"Drag anchor and handles, Alt frees one · {kinds} · {removes}"
         return f"Drag the corner · {removes} · drag a dot between corners to add one"
     if selection.kind == "light":
         if tool == "move":

@@ -102,10 +102,13 @@ def test_projection_agrees_with_the_matrices() -> None:
 
 def test_projecting_many_points_is_projecting_each() -> None:
     points = np.random.default_rng(5).uniform(-1.0, 1.0, (20, 3))
-    each = [control.project(CAMERA, tuple(point), W, H)[:2] for point in points]
-    assert control.project_all(CAMERA, points, W, H) == pytest.approx(np.array(each))
+    each = np.array([control.project(CAMERA, tuple(point), W, H) for point in points])
+    assert control.project_all(CAMERA, points, W, H) == pytest.approx(each)
+    assert control.project_all(CAMERA, points.reshape(4, 5, 3), W, H).shape == (4, 5, 3)
     points[7] = CAMERA.eye
-    assert control.project_all(CAMERA, points, W, H) is None
+    assert np.isnan(control.project_all(CAMERA, points, W, H)).all(-1).tolist() == [
+        i == 7 for i in range(20)
+    ]
 
 
 @pytest.mark.parametrize("aspect", [0.3, 1.0, 1.7])

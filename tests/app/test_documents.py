@@ -10,7 +10,9 @@ import pytest
 
 from app.editor import NOTHING, Editor, Selection
 from app.gui.beginning import first_material, first_selection, new_scene
-from app.gui.documents import Documents, FileType
+from app.gui.documents import Documents
+from app.gui.file_types import FileType
+from app.gui.imports import Imports
 from app.gui.messages import Messages
 from app.scene import Scene
 from app.scene_io import demo_scenes, load_scene, save_scene
@@ -41,7 +43,10 @@ class Desk:
 
     def __init__(self) -> None:
         self.editor, self.messages, self.chooser = Editor(new_scene()), Messages(), Chooser()
-        self.documents = Documents(self.editor, self.messages, self.chooser, self.editor.open)
+        self.imports = Imports(self.editor, self.messages, self.chooser)
+        self.documents = Documents(
+            self.editor, self.messages, self.chooser, self.imports, self.editor.open
+        )
 
     def edit(self) -> Scene:
         scene = replace(self.editor.scene, lights=())
@@ -120,8 +125,8 @@ def test_dropped_files_are_opened_added_or_refused(desk: Desk, tmp_path: Path) -
     assert item.transform.scale == pytest.approx((0.01, 0.01, 0.01))
     assert item.transform.translate == pytest.approx((0.0, -0.02, 0.0)), "it stands on the ground"
     assert desk.said == [
-        "notes.txt: found '.txt', expected a scene (.json) or a mesh (.glb, .gltf, .obj, .ply, "
-        ".stl)"
+        "notes.txt: found '.txt', expected a scene (.json), or a mesh, a drawing or a font (.glb, "
+        ".gltf, .obj, .ply, .stl, .svg, .ttf, .otf, .ttc, .otc, .woff, .woff2)"
     ]
 
 

@@ -18,15 +18,16 @@ PURE = {
     "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.curves", "app.curve_arrangement",
     "app.polygon_arrangement", "app.presets", "app.errors", "app.files",
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
-    "app.lights", "app.planes", "app.contours", "app.step_names", "app.gui.messages",
-    "app.gui.shortcuts", "app.gui.beginning", "app.gui.documents",
+    "app.lights", "app.planes", "app.contours", "app.sources", "app.step_names", "app.gui.messages",
+    "app.gui.shortcuts", "app.gui.beginning", "app.gui.documents", "app.gui.imports",
+    "app.gui.file_types",
     "app.loops", "app.text", "app.text_runs", "app.json_reader", "app.json_writer", "app.light_io",
 }  # fmt: skip
 WINDOW = {
     "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",
     "app.gui.viewport_window", "app.gui.viewport", "app.gui.overlays", "app.gui.placement",
     "app.gui.dialogs", "app.gui.message_list", "app.gui.exports", "app.gui.reports",
-    "app.gui.theme", "app.gui.live_picture",
+    "app.gui.theme", "app.gui.live_picture", "app.gui.grips", "app.gui.outline_tool",
 }  # fmt: skip
 TOP = {"app.window", "app.cli", "app.__main__"}
 """What nothing below may import: each starts the program."""

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui, immapp
 
-from app import planes
+from app import contours, planes
 from app.gui import dialogs
 from app.scene import Scene, Vec3
 from app.window import Window
@@ -184,5 +184,5 @@ class Application:
     def corner(self, vertex: tuple[int, int], light: int = 0) -> tuple[float, float]:
         """Return where a light's corner is on the screen."""
         chosen = self.scene.lights[light]
-        point = chosen.outline.contours[vertex[0]].points[vertex[1]]
+        point = contours.points_of(chosen.outline.contours[vertex[0]])[vertex[1]]
         return self.on_screen(planes.point_on(chosen.plane, point))

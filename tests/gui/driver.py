@@ -183,7 +183,8 @@ def cut_a_hole(app: Application, out: Path) -> None:
     view = app.window.viewport.view
     at = round(y - view.y), round(x - view.x)
     assert app.picture()[at].min() > 120
-    app.click("Add hole")
+    app.click("###add hole")
+    app.click("Square hole")
     assert len(app.scene.lights[0].outline.contours) == 2
     assert app.picture()[at].max() < 60, "one looks through the hole"
     app.drag("vertex 1.0", -20.0, -10.0)
@@ -196,6 +197,7 @@ def cut_a_hole(app: Application, out: Path) -> None:
 def add_copy_and_remove_lights(app: Application, out: Path) -> None:
     before = app.picture()
     app.click("###add light")
+    app.click("Square")
     assert [light.name for light in app.scene.lights] == ["key", "light"]
     assert app.window.editor.selection == Selection.light(1)
     after = app.picture()
@@ -370,7 +372,8 @@ def save_and_open_by_the_dialog(app: Application, out: Path) -> None:
     folder = out / "scenes"
     folder.mkdir()
     (folder / "notes.txt").write_text("not a scene")
-    app.click("Add hole")
+    app.click("###add hole")
+    app.click("Square hole")
     edited = app.scene
     app.key(CTRL | imgui.Key.s)
     field = "//Save the scene/##name"
@@ -476,7 +479,8 @@ def meshes_can_be_dropped(app: Application, out: Path) -> None:
 
 
 def unsaved_edits_are_asked_about(app: Application, out: Path) -> None:
-    app.click("Add hole")
+    app.click("###add hole")
+    app.click("Square hole")
     edited = app.scene
     app.key(CTRL | imgui.Key.q)
     app.click("###cancel")

@@ -1,0 +1,123 @@
+"""Files that become part of the scene: meshes, drawings and fonts, dropped or chosen.
+
+Free of the GUI, as `app.gui.documents` is, which owns the scene's own file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from app import edits, step_names
+from app.editor import Editor, Selection
+from app.gui.file_types import DRAWING_FILES, FileChooser, font_files
+from app.gui.messages import Messages
+from app.meshes import MESH_SUFFIXES, load_mesh
+from app.scene import AreaLight, OutlineSource, Scene, TextSource, Transform
+from app.sources import font_suffixes, remade
+
+
+class Imports:
+    """Adds files to the scene under edit, each as one step; failures become messages.
+
+    Parameters
+    ----------
+    editor : Editor
+        Holds the scene.
+    messages : Messages
+        Gets what failed.
+    chooser : FileChooser
+        Asks for file names.
+    """
+
+    def __init__(self, editor: Editor, messages: Messages, chooser: FileChooser) -> None:
+        self._editor = editor
+        self._messages = messages
+        self._chooser = chooser
+
+    def take(self, path: Path) -> bool:
+        """Add a file by its ending; return False if it is of no kind that can be added."""
+        suffix = path.suffix.lower()
+        if suffix in MESH_SUFFIXES:
+            self.add_mesh(path)
+        elif suffix in DRAWING_FILES[1]:
+            self.add_drawing(path)
+        elif suffix in font_suffixes():
+            self.use_font(path)
+        else:
+            return False
+        return True
+
+    def add_mesh(self, path: Path) -> None:
+        """Add a mesh file as an object, scaled to a metre if it is far from that."""
+        with self._messages.guard():
+            low, high = load_mesh(str(path.resolve())).bounds.astype(float)
+            extent = float((high - low).max())
+            factor = 1.0 if 0.1 <= extent <= 10.0 else 1.0 / max(extent, 1e-9)
+            place = Transform((0.0, -factor * float(low[1]), 0.0), scale=(factor,) * 3)
+            scene, index = edits.add_object(
+                self._editor.scene, str(path.resolve()), path.stem, place
+            )
+            self._editor.apply(f"Add '{path.stem}'", scene)
+            self._editor.selection = Selection.object(index)
+
+    # --- lights -----------------------------------------------------------------
+
+    def add_text(self, font: str = "") -> None:
+        """Add a text light, to be typed in its panel."""
+        self._add_light(lambda scene: edits.add_text(scene, font=font))
+
+    def add_drawing(self, path: Path) -> None:
+        """Add an SVG file as a light."""
+        self._add_light(lambda scene: edits.add_drawing(scene, str(path.resolve())))
+
+    def ask_drawing(self) -> None:
+        """Ask for an SVG file and add it as a light."""
+        title = "Add a drawing as a light"
+        self._chooser.ask_open(title, DRAWING_FILES, self._folder(), self.add_drawing)
+
+    def use_font(self, path: Path) -> None:
+        """Set the selected text in another font; without one, add a new text."""
+        light = self._editor.selected_light
+        if light is not None and isinstance(light.source, TextSource):
+            self._make_again(light, replace(light.source, font=str(path.resolve())))
+        else:
+            self.add_text(str(path.resolve()))
+
+    def ask_source(self, light: AreaLight) -> None:
+        """Ask for another font or drawing for a light that was made from one."""
+        source = light.source
+        if isinstance(source, TextSource):
+            text, folder = source, self._folder(source.font)
+            self._chooser.ask_open(
+                "Choose a font", font_files(), folder,
+                lambda path: self._make_again(light, replace(text, font=str(path.resolve()))),
+            )  # fmt: skip
+        elif source is not None:
+            drawing, folder = source, self._folder(source.path)
+            self._chooser.ask_open(
+                "Choose a drawing", DRAWING_FILES, folder,
+                lambda path: self._make_again(light, replace(drawing, path=str(path.resolve()))),
+            )  # fmt: skip
+
+    def _add_light(self, add: Callable[[Scene], tuple[Scene, int]]) -> None:
+        with self._messages.guard():
+            scene, index = add(self._editor.scene)
+            self._editor.apply(step_names.describe(self._editor.scene, scene), scene)
+            self._editor.selection = Selection.light(index)
+
+    def _make_again(self, light: AreaLight, source: OutlineSource) -> None:
+        """Make a light, found by its name, from another source."""
+        with self._messages.guard():
+            before = self._editor.scene
+            names = [other.name for other in before.lights]
+            if light.name in names:
+                index = names.index(light.name)
+                after = edits.replace_light(before, index, remade(before.lights[index], source))
+                self._editor.apply(step_names.describe(before, after), after)
+
+    def _folder(self, beside: str = "") -> Path:
+        """Return where to begin looking for a file: beside another one, else beside the scene."""
+        scene = self._editor.path
+        return Path(beside).parent if beside else scene.parent if scene else Path.home()
