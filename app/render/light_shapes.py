@@ -15,12 +15,14 @@ Directly from Glyph Outlines" (JCGT 6:2), but for cubics and any number of them:
    the box of its ends must be looked at. Ends are rounded to float32 once and shared
    by neighbours, so of two pieces that join exactly one counts, whatever q is: no
    wrong lines.
-3. The box is cut along q into equal bands, each with a list of the pieces that
-   reach it, the farthest along +p first, so that a pixel stops where the rest is
-   behind it.
+3. The box is cut along q into equal bands. Each has a list of the pieces that cross
+   it, in order of their least p there: how many of them are wholly beyond a pixel is
+   found by halving. The few that begin or end in the band follow, the farthest first,
+   so that a pixel stops where the rest is behind it. Only a piece whose box within the
+   band holds the pixel needs the solution of its cubic.
 
-Whether p runs along s or along t is chosen by the shorter lists: a word is cut
-into columns, a comb across its teeth.
+Whether p runs along s or along t is chosen by the expected number of looks: a word
+is cut into columns, a comb across its teeth.
 
 Bands depend on the outline only; where it is in the picture is a matrix from pixels
 to (p, q), computed in float64 for every picture. So the shape is exact to float32
@@ -35,7 +37,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.curves import bounds, extrema, part
+from app.curves import bounds, evaluate, extrema, part
 from app.outline import boundary, resolve, triangulate
 from app.render.caching import ByteCache
 from app.render.camera import CameraFrame
@@ -57,15 +59,18 @@ OUTLINE_PIECE = np.dtype(
         ("unused", "<f4", 2),
     ]
 )
-"""A cubic with monotone p and q, three texels: q of its ends, their least and greatest
-p, p of its control points, q of its handles."""
+"""A cubic with monotone p and q, three texels: q of its ends; its least p in the band
+and the greatest there of it and those that follow; p of its control points; q of its
+handles."""
 
 TEXELS_PER_PIECE = OUTLINE_PIECE.itemsize // 16
-MOST_BANDS = 256
-MOST_COPIES = 4
-"""Lists may hold each piece so often on average; fewer bands if it is more."""
+LEAST_BANDS, MOST_BANDS = 16, 256
+MOST_COPIES = 16
+"""Lists may hold each piece so often on average; fewer bands, to `LEAST_BANDS`, if it is more."""
 BAND_MARGIN = 1e-6
 """By how much a piece reaches into the neighbouring bands [box]: a few roundings of q."""
+HALVINGS = 24
+"""Of a piece, to find where it enters and leaves a band: to a rounding of float32."""
 TRIANGLE_MARGIN = 1.0 + 2.0**-10
 """Half the box that the triangle covers: its corners are rounded, the shape is not."""
 EDGE_ON = 1e-12
@@ -141,14 +146,17 @@ class OutlineBands:
     Attributes
     ----------
     texels : (n, 4) float32, read-only
-        First ``bands`` texels (first texel of the list, pieces in it, 0, 0), then
-        the lists of `OUTLINE_PIECE`. Indices count from the first of these texels.
+        First ``bands`` texels (first texel of the list, pieces that cross the band,
+        pieces that do not, 0), then the lists of `OUTLINE_PIECE`. Indices count
+        from the first of these texels.
     bands : int
         0 if nothing is inside.
     centre, half : (2,) float64
         The box around the boundary, in the plane's (s, t).
     swapped : bool
         (p, q) run along (t, s) instead of (s, t).
+    looks : float
+        Pieces that a pixel in the middle of the box looks at, on average over bands.
     """
 
     texels: Texels
@@ -156,11 +164,7 @@ class OutlineBands:
     centre: FloatArray
     half: FloatArray
     swapped: bool
-
-    @property
-    def pieces_per_band(self) -> float:
-        """Mean length of the lists."""
-        return (len(self.texels) - self.bands) / TEXELS_PER_PIECE / max(self.bands, 1)
+    looks: float
 
 
 def outline_bands(outline: Outline) -> OutlineBands:
@@ -171,16 +175,18 @@ def outline_bands(outline: Outline) -> OutlineBands:
 def _outline_bands(outline: Outline) -> OutlineBands:
     loops = boundary(outline)
     if not loops:
-        return OutlineBands(np.zeros((0, 4), np.float32), 0, np.zeros(2), np.ones(2), False)
+        return OutlineBands(np.zeros((0, 4), np.float32), 0, np.zeros(2), np.ones(2), False, 0.0)
     curves = np.concatenate(loops)
     lows, highs = bounds(curves)
     low, high = lows.min(axis=0), highs.max(axis=0)
     centre = 0.5 * low + 0.5 * high
     half = np.maximum(high - centre, centre - low)
     pieces = _monotone_pieces((curves - centre) / half).astype(np.float32)
-    along_s = _banded(pieces, centre, half, swapped=False)
-    along_t = _banded(pieces[..., ::-1], centre, half, swapped=True)
-    return min(along_s, along_t, key=lambda bands: bands.pieces_per_band)
+    lists = [_listed(axes) for axes in (pieces, pieces[..., ::-1])]
+    swapped = lists[1].looks < lists[0].looks
+    texels = _texels(lists[swapped])
+    texels.setflags(write=False)
+    return OutlineBands(texels, lists[swapped].bands, centre, half, swapped, lists[swapped].looks)
 
 
 def _monotone_pieces(curves: FloatArray) -> FloatArray:
@@ -194,38 +200,109 @@ def _monotone_pieces(curves: FloatArray) -> FloatArray:
     return np.concatenate([part(curves, stops[:, i], stops[:, i + 1]) for i in range(5)])
 
 
-def _banded(pieces: Texels, centre: FloatArray, half: FloatArray, *, swapped: bool) -> OutlineBands:
+@dataclass(frozen=True, eq=False)
+class _Lists:
+    """Which pieces (m, 4, 2), of (p, q), are in which band: pairs (n,) of piece and band."""
+
+    pieces: Texels
+    bands: int
+    piece: NDArray[np.int64]
+    band: NDArray[np.int64]
+    crosses: NDArray[np.bool_]
+    bottom: FloatArray
+    top: FloatArray
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """How many cross each band, and how many do not, (bands, 2)."""
+        group = 2 * self.band + ~self.crosses
+        return np.bincount(group, minlength=2 * self.bands).reshape(self.bands, 2)
+
+    @property
+    def looks(self) -> float:
+        """From the middle: a search among those that cross, half of the rest in turn."""
+        return float(np.mean(np.log2(self.counts[:, 0] + 1.0) + 0.5 * self.counts[:, 1]))
+
+
+def _listed(pieces: Texels) -> _Lists:
     # Without extent along q, as rounded, a piece is met by no ray.
     pieces = pieces[pieces[:, 0, 1] != pieces[:, 3, 1]]
-    records = np.zeros(len(pieces), dtype=OUTLINE_PIECE)
-    records["q_ends"] = pieces[:, (0, 3), 1]
-    records["p_range"] = np.sort(pieces[:, (0, 3), 0], axis=1)
-    records["p"] = pieces[..., 0]
-    records["q_handles"] = pieces[:, 1:3, 1]
-
-    ends = pieces[:, (0, 3), 1].astype(np.float64)
-    low, high = ends.min(axis=1) - BAND_MARGIN, ends.max(axis=1) + BAND_MARGIN
-    bands = min(MOST_BANDS, 1 << max(len(pieces) - 1, 0).bit_length())
+    low, high = np.sort(pieces[:, (0, 3), 1].astype(np.float64), axis=1).T
+    bands = min(MOST_BANDS, max(LEAST_BANDS, 1 << (2 * len(pieces)).bit_length()))
     while True:
         first, last = (
             np.clip(np.floor((q + 1.0) * 0.5 * bands), 0, bands - 1).astype(np.int64)
-            for q in (low, high)
+            for q in (low - BAND_MARGIN, high + BAND_MARGIN)
         )
         reach = last - first + 1
-        if bands == 1 or reach.sum() <= MOST_COPIES * len(pieces):
+        if bands <= LEAST_BANDS or reach.sum() <= MOST_COPIES * len(pieces):
             break
         bands //= 2
     piece = np.repeat(np.arange(len(pieces)), reach)
     band = first[piece] + np.arange(len(piece)) - np.repeat(np.cumsum(reach) - reach, reach)
-    order = np.lexsort((-records["p_range"][piece, 1], band))
-    counts = np.bincount(band, minlength=bands)
-    heads = np.zeros((bands, 4), dtype=np.float32)
-    heads[:, 0] = bands + TEXELS_PER_PIECE * (np.cumsum(counts) - counts)
-    heads[:, 1] = counts
-    lists = records[piece[order]].view(np.float32).reshape(-1, 4)
-    texels = np.concatenate([heads, lists])
-    texels.setflags(write=False)
-    return OutlineBands(texels, bands, centre, half, swapped)
+    bottom = band * (2.0 / bands) - 1.0 - BAND_MARGIN
+    top = (band + 1) * (2.0 / bands) - 1.0 + BAND_MARGIN
+    crosses = (low[piece] <= bottom) & (high[piece] > top)
+    return _Lists(pieces, bands, piece, band, crosses, bottom, top)
+
+
+def _texels(lists: _Lists) -> Texels:
+    """Return what `OutlineBands` describes."""
+    pieces, piece, band, crosses = lists.pieces, lists.piece, lists.band, lists.crosses
+    least, greatest = _p_between(pieces.astype(np.float64)[piece], lists.bottom, lists.top)
+    order = np.lexsort((-np.where(crosses, least, greatest), ~crosses, band))
+    # Pieces do not cross, so those that cross the band are in order of both their
+    # least and their greatest p but for roundings: no greater one may follow.
+    greatest = _greatest_to_come(greatest[order], (2 * band + ~crosses)[order])
+    sorted_pieces = pieces[piece[order]]
+    records = np.zeros(len(order), dtype=OUTLINE_PIECE)
+    records["q_ends"] = sorted_pieces[:, (0, 3), 1]
+    records["p_range"] = np.stack([least[order], greatest], axis=1)
+    records["p"] = sorted_pieces[..., 0]
+    records["q_handles"] = sorted_pieces[:, 1:3, 1]
+    counts = lists.counts
+    heads = np.zeros((lists.bands, 4), dtype=np.float32)
+    heads[:, 0] = lists.bands + TEXELS_PER_PIECE * (np.cumsum(counts.sum(1)) - counts.sum(1))
+    heads[:, 1:3] = counts
+    return np.concatenate([heads, records.view(np.float32).reshape(-1, 4)])
+
+
+def _p_between(
+    pieces: FloatArray, bottom: FloatArray, top: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest p (n,) of pieces (n, 4, 2) where q is between two values.
+
+    By halving, and from the outer sides of what is left.
+    """
+    rising = pieces[:, 3, 1] > pieces[:, 0, 1]
+    below, above = np.where(rising, (bottom, top), (top, bottom))
+    # In powers of x, which is faster; it rounds in the sixteenth digit.
+    a, b, c, d = _powers(pieces[..., 1])
+    q = np.stack([below, above])
+    low, high = np.zeros_like(q), np.ones_like(q)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        value = ((a * middle + b) * middle + c) * middle + d
+        before = (value < q) == rising
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    ends = np.stack([evaluate(pieces, low[0])[:, 0], evaluate(pieces, high[1])[:, 0]])
+    return ends.min(axis=0), ends.max(axis=0)
+
+
+def _powers(f: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the coefficients of x^3, x^2, x and 1 of cubics (n, 4) in Bézier form."""
+    p0, p1, p2, p3 = f.T
+    return p3 - p0 + 3.0 * (p1 - p2), 3.0 * (p0 - 2.0 * p1 + p2), 3.0 * (p1 - p0), p0
+
+
+def _greatest_to_come(values: FloatArray, group: NDArray[np.int64]) -> FloatArray:
+    """Return of values (n,), and those after them in their group, the greatest.
+
+    Groups are runs of ascending numbers; values are from -2 to 2.
+    """
+    # Offsets make every later group smaller than all before it, seen from the end.
+    offset = 8.0 * group
+    return np.asarray(np.maximum.accumulate((values - offset)[::-1])[::-1] + offset)
 
 
 @dataclass(frozen=True, eq=False)
