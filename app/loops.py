@@ -39,7 +39,8 @@ def closed_loop(pieces: Sequence[Piece]) -> FloatArray | None:
     -------
     (k, 4, 2) float64 or None
         Lines with their handles at the thirds, quadratics raised exactly,
-        pieces of no extent left out; None if nothing is left.
+        pieces of no extent left out; None for a loop that lies on one line,
+        which encloses nothing.
     """
     kept = [piece for piece in pieces if any(point != piece[0] for point in piece)]
     if not kept:
@@ -54,7 +55,16 @@ def closed_loop(pieces: Sequence[Piece]) -> FloatArray | None:
         which = [i for i, piece in enumerate(kept) if len(piece) == count]
         if which:
             curves[which] = raised(np.array([kept[i] for i in which], dtype=np.float64))
-    return curves
+    return None if _is_flat(curves) else curves
+
+
+def _is_flat(curves: FloatArray) -> bool:
+    """Tell whether all points are on one line, to what rounding can do."""
+    steps = curves.reshape(-1, 2) - curves[0, 0]
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    x, y = steps[np.argmax(lengths)] / np.max(lengths)
+    rounding = 8.0 * np.finfo(np.float64).eps * np.max(np.abs(curves))
+    return bool(np.max(np.abs(steps[:, 0] * y - steps[:, 1] * x)) <= rounding)
 
 
 def _line(pieces: FloatArray) -> FloatArray:

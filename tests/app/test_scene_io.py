@@ -16,9 +16,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.errors import InputError
+from app.json_reader import LARGEST_NUMBER
+from app.json_writer import LINE_LENGTH
 from app.scene import (
     ANCHOR_KINDS,
     FILL_RULES,
+    TEXT_ALIGNS,
     TONE_MAPS,
     AreaLight,
     BezierContour,
@@ -31,17 +34,13 @@ from app.scene import (
     Scene,
     SceneError,
     SceneObject,
+    SvgSource,
+    TextSource,
     Transform,
 )
-from app.scene_io import (
-    LARGEST_NUMBER,
-    LINE_LENGTH,
-    demo_scenes,
-    load_scene,
-    save_scene,
-    scene_from_json,
-    scene_to_json,
-)
+from app.scene_io import demo_scenes, load_scene, save_scene, scene_from_json, scene_to_json
+from app.svg import svg_outline
+from app.text import text_outline
 
 EXAMPLE = """{
   "format": "ltc-scene/1",
@@ -185,6 +184,15 @@ outlines = valid(
     contours=st.lists(polygons | chains(), min_size=1, max_size=3).map(tuple),
     fill_rule=st.sampled_from(FILL_RULES),
 )
+sources = valid(
+    TextSource,
+    text=st.text(st.characters(exclude_categories=("Cs",)), max_size=20),
+    font=st.sampled_from(("", "/fonts/a.ttf", "/scenes/ü b.otf")),
+    size=st.floats(1e-9, LARGEST_NUMBER),
+    align=st.sampled_from(TEXT_ALIGNS),
+    spacing=numbers,
+    line_height=numbers,
+) | valid(SvgSource, path=st.sampled_from(("/a.svg", "/b/c d.svg")), size=st.floats(1e-9, 1e9))
 lights = valid(
     AreaLight,
     name=names,
@@ -193,6 +201,7 @@ lights = valid(
     radiance=triples(st.floats(0.0, LARGEST_NUMBER)),
     two_sided=st.booleans(),
     visible=st.booleans(),
+    source=st.none() | sources,
 )
 materials = valid(
     Material,
@@ -428,6 +437,78 @@ def test_a_linked_folder(tmp_path: Path) -> None:
     save_scene(mesh_scene(str(tmp_path / "real" / "m.obj")), tmp_path / "link" / "s.json")
     for folder in (tmp_path / "link", real):
         assert load_scene(folder / "s.json").objects[0].mesh == str(tmp_path / "real" / "m.obj")
+
+
+# Text and drawings
+
+LINES = {"string": "To\nfly", "size": 0.5, "align": "left", "spacing": 0.1, "line_height": 1.5}
+DRAWING = '<svg xmlns="http://www.w3.org/2000/svg"><circle r="3"/></svg>'
+
+
+def test_a_light_of_text_gets_its_outline() -> None:
+    (light,) = read(document(lights=[{"text": LINES}])).lights
+    source = TextSource("To\nfly", "", 0.5, "left", 0.1, 1.5)
+    assert light == AreaLight("light 1", text_outline(source), source=source)
+    for written in ("To fly", {"text": "To fly"}, {"string": "To fly"}):
+        (light,) = read(document(lights=[{"text": written}])).lights
+        assert light.source == TextSource("To fly")
+
+
+def test_a_light_of_a_drawing_gets_its_outline(tmp_path: Path) -> None:
+    drawing = tmp_path / "a.svg"
+    drawing.write_text(DRAWING)
+    source = SvgSource(str(drawing), 3.0)
+    for written in ({"path": "a.svg", "size": 3}, {"path": "../a.svg", "size": 3}):
+        folder = tmp_path / "in" if written["path"] == "../a.svg" else tmp_path
+        folder.mkdir(exist_ok=True)
+        text = document(lights=[{"svg": written}])
+        (light,) = scene_from_json(text, folder, "test").lights
+        assert light == AreaLight("light 1", svg_outline(source), source=source)
+    (light,) = scene_from_json(document(lights=[{"svg": "a.svg"}]), tmp_path, "test").lights
+    assert light.source == SvgSource(str(drawing))
+
+
+def test_an_outline_needs_no_source(tmp_path: Path) -> None:
+    outline = {"contours": [{"polygon": SQUARE.points}]}
+    text = {"string": "no such letter: \u4e2d", "font": "gone/font.ttf"}
+    path = tmp_path / "s.json"
+    path.write_text(
+        document(
+            lights=[
+                {"outline": outline, "text": text},
+                {"outline": outline, "svg": {"path": "gone.svg"}},
+                {"outline": outline, "text": {"string": ""}},
+            ]
+        )
+    )
+    scene = load_scene(path)
+    assert [light.outline for light in scene.lights] == [Outline((SQUARE,))] * 3
+    assert [light.source for light in scene.lights] == [
+        TextSource(text["string"], str(tmp_path / "gone" / "font.ttf")),
+        SvgSource(str(tmp_path / "gone.svg")),
+        TextSource(""),
+    ]
+    save_scene(scene, path)
+    assert load_scene(path) == scene
+
+
+def test_paths_of_sources_are_relative_to_the_file(tmp_path: Path) -> None:
+    outline = Outline((SQUARE,))
+    scene = Scene(
+        lights=(
+            AreaLight("a", outline, source=TextSource("A", str(tmp_path / "fonts" / "a b.ttf"))),
+            AreaLight("b", outline, source=SvgSource(str(tmp_path / "scenes" / "b.svg"), 3.0)),
+            AreaLight("c", outline, source=TextSource("C")),
+        )
+    )
+    (tmp_path / "scenes").mkdir()
+    path = tmp_path / "scenes" / "s.json"
+    save_scene(scene, path)
+    written = json.loads(path.read_text())["lights"]
+    assert written[0]["text"]["font"] == "../fonts/a b.ttf"
+    assert written[1]["svg"] == {"path": "b.svg", "size": 3}
+    assert written[2]["text"]["font"] == ""
+    assert load_scene(path) == scene
 
 
 # Saving
