@@ -51,6 +51,7 @@ from app.scene import (
     TextSource,
     Vec2,
 )
+from app.sources import outline_from
 
 DEFAULT_CONTOUR = PolygonContour(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 
@@ -99,15 +100,8 @@ def _with_outline(values: dict[str, Any], place: str) -> dict[str, Any]:
 
 
 def _made(source: OutlineSource, place: str) -> Outline:
-    # Fonts and drawings cost a fifth of a second to import, and few scenes have any.
     try:
-        if isinstance(source, TextSource):
-            from app.text import text_outline
-
-            return text_outline(source)
-        from app.svg import svg_outline
-
-        return svg_outline(source)
+        return outline_from(source)
     except InputError as error:
         raise PlaceError(place, str(error)) from None
 

@@ -152,13 +152,15 @@ def _read_font(path: Path, changed: int, size: int) -> _Font:
             tables.save(unpacked, reorderTables=None)
             data = unpacked.getvalue()
             tables = TTFont(io.BytesIO(data), lazy=True)
+        if any(table not in tables for table in ("head", "maxp", "cmap")):
+            raise ValueError
         if not any(table in tables for table in ("glyf", "CFF ", "CFF2")):
             raise InputError(
                 f"{path}: the font has pictures of letters only, expected one with outlines"
             )
         face = uharfbuzz.Face(data, 0)
         em = int(tables["head"].unitsPerEm)
-        if em < 1 or "maxp" not in tables or "cmap" not in tables:
+        if em < 1:
             raise ValueError
         return _Font(uharfbuzz.Font(face), tables, tables.getGlyphSet(), em)
     except (InputError, OSError):
