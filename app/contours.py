@@ -24,6 +24,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +37,7 @@ from app.scene import (
     BezierContour,
     Contour,
     CubicCurve,
+    Outline,
     PolygonContour,
     SceneError,
     Vec2,
@@ -88,6 +91,30 @@ def curves_of(contour: Contour) -> FloatArray:
     return line_as_cubic(points, np.roll(points, -1, axis=0))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Segments:
+    """All segments of an outline, contour after contour, as read-only arrays.
+
+    ``curves`` are (n, 4, 2) cubics, ``straight`` (n,) tells which are lines;
+    contour i has those from ``starts[i]`` to ``starts[i + 1]``.
+    """
+
+    curves: FloatArray
+    straight: NDArray[np.bool_]
+    starts: tuple[int, ...]
+
+
+@lru_cache(maxsize=64)
+def segments_of(outline: Outline) -> Segments:
+    """Return all segments of an outline; cached, since every frame asks for them."""
+    each = [curves_of(contour) for contour in outline.contours]
+    curves = np.concatenate(each)
+    straight = np.concatenate([straight_segments(contour) for contour in outline.contours])
+    curves.setflags(write=False)
+    straight.setflags(write=False)
+    return Segments(curves, straight, (0, *np.cumsum([len(part) for part in each]).tolist()))
+
+
 def straight_segments(contour: Contour) -> NDArray[np.bool_]:
     """Return which segments are straight lines, (n,) bool."""
     if isinstance(contour, PolygonContour):
@@ -114,13 +141,12 @@ def point_at(contour: Contour, segment: int, along: float) -> Vec2:
     return (s, t)
 
 
-def bounds(contour: Contour) -> FloatArray:
-    """Return the lower and upper corner (2, 2) of a contour's bounding box, handles left out."""
-    if isinstance(contour, PolygonContour):
-        points = np.array(contour.points, dtype=np.float64)
-        return np.stack([points.min(0), points.max(0)])
-    low, high = cubic.bounds(curves_of(contour))
-    return np.stack([low.min(0), high.max(0)])
+@lru_cache(maxsize=64)
+def bounds(outline: Outline) -> tuple[Vec2, Vec2]:
+    """Return the lower and upper corner of an outline's bounding box, handles left out."""
+    low, high = cubic.bounds(segments_of(outline).curves)
+    (s0, t0), (s1, t1) = low.min(0).tolist(), high.max(0).tolist()
+    return (s0, t0), (s1, t1)
 
 
 def flatten(contour: Contour, tolerance: float, metric: FloatArray = UNIT) -> FloatArray:

@@ -128,8 +128,7 @@ def new_size(camera: Camera) -> float:
 def add_preset(scene: Scene, name: str) -> tuple[Scene, int]:
     """Add a light of one of `app.presets.PRESETS`, of `new_size`; return its index."""
     outline = PRESETS[name]()
-    boxes = np.array([contours.bounds(contour) for contour in outline.contours])
-    low, high = boxes[:, 0].min(0), boxes[:, 1].max(0)
+    low, high = np.array(contours.bounds(outline))
     factor = new_size(scene.camera) / float((high - low).max())
     shift = -0.5 * factor * (low + high)
     fitted = tuple(

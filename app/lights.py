@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import lru_cache
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -24,6 +25,7 @@ from app.scene import (
     BezierContour,
     Contour,
     FillRule,
+    Outline,
     Plane,
     PolygonContour,
     SceneError,
@@ -75,9 +77,7 @@ def word_for_vertex(contour: Contour) -> str:
 
 def extent_of(light: AreaLight) -> tuple[Vec2, Vec2]:
     """Return the lower and upper corner of the outline's bounding box, in (s, t)."""
-    boxes = np.array([contours.bounds(contour) for contour in light.outline.contours])
-    (s0, t0), (s1, t1) = boxes[:, 0].min(0).tolist(), boxes[:, 1].max(0).tolist()
-    return (s0, t0), (s1, t1)
+    return contours.bounds(light.outline)
 
 
 def centre_of(light: AreaLight) -> Vec3:
@@ -87,25 +87,28 @@ def centre_of(light: AreaLight) -> Vec3:
 
 def bounds_of(light: AreaLight) -> tuple[Vec3, float]:
     """Return centre and radius [m] of a sphere around the light, about `centre_of`."""
-    middle = np.array(mix(*extent_of(light), 0.5)) @ metric_from_plane(light.plane).T
-    loops, tolerance = _loops(light)
+    return centre_of(light), _radius(light.outline, light.plane)
+
+
+@lru_cache(maxsize=64)
+def _radius(outline: Outline, plane: Plane) -> float:
+    middle = np.array(mix(*contours.bounds(outline), 0.5)) @ metric_from_plane(plane).T
+    loops, tolerance = _loops(outline, plane)
     away = np.concatenate(loops) - middle
-    return centre_of(light), float(np.linalg.norm(away, axis=-1).max()) + tolerance
+    return float(np.linalg.norm(away, axis=-1).max()) + tolerance
 
 
-def _loops(light: AreaLight) -> tuple[list[FloatArray], float]:
+def _loops(outline: Outline, plane: Plane) -> tuple[list[FloatArray], float]:
     """Return the contours as polygons (n, 2) [m] and how far they may miss curves [m]."""
-    metric = metric_from_plane(light.plane)
-    if not is_curved(light):
-        polygons = [np.array(contours.points_of(c)) @ metric.T for c in light.outline.contours]
-        return polygons, 0.0
-    (s0, t0), (s1, t1) = extent_of(light)
+    metric = metric_from_plane(plane)
+    (s0, t0), (s1, t1) = contours.bounds(outline)
     size = float(np.abs(metric @ np.diag((s1 - s0, t1 - t0))).sum())
     tolerance = FINE * max(size, 1e-30)
-    return [
-        contours.flatten(contour, tolerance, metric) @ metric.T
-        for contour in light.outline.contours
-    ], tolerance
+    loops = [
+        contours.flatten(contour, tolerance, metric) @ metric.T for contour in outline.contours
+    ]
+    curved = any(isinstance(contour, BezierContour) for contour in outline.contours)
+    return loops, tolerance if curved else 0.0
 
 
 def _with_contours(light: AreaLight, changed: Iterable[Contour]) -> AreaLight:
@@ -329,7 +332,7 @@ def widest_place(light: AreaLight) -> tuple[FloatArray, float, int]:
     point: the "pole of inaccessibility" without a cell queue. Curves count as
     polygons within `FINE`.
     """
-    loops, _ = _loops(light)
+    loops, _ = _loops(light.outline, light.plane)
     corners = np.concatenate(loops)
     low, high = corners.min(0), corners.max(0)
     centre, half = (low + high) / 2.0, (high - low) / 2.0

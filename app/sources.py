@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.scene import AreaLight, Outline, OutlineSource, TextSource
+import numpy as np
+
+from app import contours
+from app.scene import AreaLight, Outline, OutlineSource, SvgSource, TextSource
 
 
 def outline_from(source: OutlineSource) -> Outline:
@@ -37,6 +40,31 @@ def remade(light: AreaLight, source: OutlineSource) -> AreaLight:
         If the outline cannot be made.
     """
     return replace(light, outline=outline_from(source), source=source)
+
+
+def resized(light: AreaLight, size: float) -> AreaLight:
+    """Return the light with the outline of a source of another size, without reading its file."""
+    if light.source is None:
+        return light
+    matrix = size / light.source.size * np.eye(2)
+    scaled = tuple(
+        contours.transform(contour, matrix, np.zeros(2)) for contour in light.outline.contours
+    )
+    outline = replace(light.outline, contours=scaled)
+    return replace(light, outline=outline, source=replace(light.source, size=size))
+
+
+def left_out(source: SvgSource) -> tuple[str, ...]:
+    """Return in words what of a drawing is not in its outline: "a picture", "text", ...
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    from app.svg import read_drawing
+
+    return read_drawing(source).left_out
 
 
 def font_suffixes() -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from app import contours
 from app.curves import evaluate
 from app.gui.overlays import Sight, on_plane
-from app.scene import AnchorKind, AreaLight, BezierContour, Contour
+from app.scene import AnchorKind, AreaLight
 
 Place: TypeAlias = tuple[float, float]
 
@@ -21,8 +22,10 @@ MOST_VERTICES = 400
 """Corners and anchors in the picture beyond which none is shown: they would hide the light."""
 SHORTEST_EDGE = 56.0
 """Length in points from which on a segment offers a point to add a vertex."""
-APART = 2.0
-"""Points from its anchor from which on a handle is shown; nearer it counts as lying on it."""
+APART, FAR_APART = 2.0, 16.0
+"""Points from its anchor from which on a handle is shown, beside the selected vertex and elsewhere.
+
+Nearer ones count as lying on the anchor, and elsewhere would hide it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,28 +63,41 @@ def grips_of(
     held : str
         The name of a grip that is part of it wherever it is.
     """
-    found: list[Grip] = []
+    segments = contours.segments_of(light.outline)
+    screen = _places(sight, light, segments.curves)
+    middles = _places(sight, light, evaluate(segments.curves, 0.5))
+    roomy = _lengths(screen) >= SHORTEST_EDGE
     crowded = is_crowded(light)
+    found: list[Grip] = []
     for number, contour in enumerate(light.outline.contours):
-        curves = contours.curves_of(contour)
-        screen = _places(sight, light, curves)
-        middles = _places(sight, light, evaluate(curves, 0.5))
+        first, kinds = segments.starts[number], contours.kinds_of(contour)
         near = selected[1] if selected is not None and selected[0] == number else None
-        kinds = contours.kinds_of(contour)
-        if isinstance(contour, BezierContour):
-            found += _handles(number, contour, screen, near, crowded, sight.unit, held)
+        beside = set() if near is None else {near, (near - 1) % len(kinds)}
         for index, kind in enumerate(kinds):
-            x, y = screen[index, 0].tolist()
-            found.append(Grip("vertex", number, index, (x, y), kind=kind))
-            middle = Grip("edge", number, index, _pair(middles[index]))
-            if _length(screen[index]) >= SHORTEST_EDGE or middle.name == held:
+            row = screen[first + index]
+            found.append(Grip("vertex", number, index, _pair(row[0]), kind=kind))
+            middle = Grip("edge", number, index, _pair(middles[first + index]))
+            if roomy[first + index] or middle.name == held:
                 found.append(middle)
-    before_eye = (grip for grip in found if np.isfinite(grip.at).all())
-    seen = [grip for grip in before_eye if grip.name == held or sight.view.contains(*grip.at)]
+            if segments.straight[first + index]:
+                least = math.inf
+            else:
+                least = APART if index in beside else math.inf if crowded else FAR_APART
+            following = kinds[(index + 1) % len(kinds)]
+            for which, anchor, owner in ((1, _pair(row[0]), kind), (2, _pair(row[3]), following)):
+                at = _pair(row[which])
+                handle = Grip("handle", number, index, at, which, owner, anchor)
+                if math.dist(at, anchor) >= least * sight.unit or handle.name == held:
+                    found.append(handle)
+    seen = [grip for grip in found if _is_seen(sight, grip, held)]
     if sum(grip.what == "vertex" for grip in seen) > MOST_VERTICES:
         chosen = f"vertex {selected[0]}.{selected[1]}" if selected is not None else ""
         return [grip for grip in seen if grip.name in (held, chosen)]
     return seen
+
+
+def _is_seen(sight: Sight, grip: Grip, held: str) -> bool:
+    return sight.view.contains(*grip.at) or (grip.name == held and math.isfinite(grip.at[0]))
 
 
 def is_crowded(light: AreaLight) -> bool:
@@ -104,40 +120,6 @@ def _away(grip: Grip, x: float, y: float) -> float:
     return (grip.at[0] - x) ** 2 + (grip.at[1] - y) ** 2
 
 
-def _handles(
-    number: int,
-    contour: Contour,
-    screen: NDArray[np.float64],
-    near: int | None,
-    crowded: bool,
-    unit: float,
-    held: str,
-) -> list[Grip]:
-    """Return the handles of a contour's curves; straight segments have none to show."""
-    found = []
-    straight, kinds = contours.straight_segments(contour), contours.kinds_of(contour)
-    count = len(kinds)
-    beside = set() if near is None else {near, (near - 1) % count}
-    for segment in range(count):
-        for which in (1, 2):
-            owner = segment if which == 1 else (segment + 1) % count
-            anchor = _pair(screen[segment, 0 if which == 1 else 3])
-            grip = Grip(
-                "handle",
-                number,
-                segment,
-                _pair(screen[segment, which]),
-                which,
-                kinds[owner],
-                anchor,
-            )
-            apart = np.hypot(grip.at[0] - anchor[0], grip.at[1] - anchor[1]) >= APART * unit
-            shown = (segment in beside or not crowded) and not straight[segment] and apart
-            if shown or grip.name == held:
-                found.append(grip)
-    return found
-
-
 def _places(sight: Sight, light: AreaLight, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return screen coordinates (..., 2) of plane coordinates; NaN behind the eye."""
     found: NDArray[np.float64] = sight.view.project_all(
@@ -150,9 +132,9 @@ def _pair(point: NDArray[np.float64]) -> Place:
     return (float(point[0]), float(point[1]))
 
 
-def _length(points: NDArray[np.float64]) -> float:
-    """Return about the length of a curve (4, 2): the mean of its chord and its control polygon."""
-    ways = np.diff(points, axis=0)
-    around = np.hypot(ways[:, 0], ways[:, 1]).sum()
-    chord = np.hypot(*(points[3] - points[0]))
-    return float(0.5 * (around + chord))
+def _lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return about the lengths of curves (n, 4, 2): between chord and control polygon."""
+    ways = np.diff(points, axis=1)
+    around = np.hypot(ways[..., 0], ways[..., 1]).sum(-1)
+    chords = points[:, 3] - points[:, 0]
+    return np.asarray(0.5 * (around + np.hypot(chords[:, 0], chords[:, 1])))

@@ -5,7 +5,6 @@ Free of the GUI, as `app.gui.documents` is, which owns the scene's own file.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,8 +13,8 @@ from app.editor import Editor, Selection
 from app.gui.file_types import DRAWING_FILES, FileChooser, font_files
 from app.gui.messages import Messages
 from app.meshes import MESH_SUFFIXES, load_mesh
-from app.scene import AreaLight, OutlineSource, Scene, TextSource, Transform
-from app.sources import font_suffixes, remade
+from app.scene import AreaLight, OutlineSource, Scene, SvgSource, TextSource, Transform
+from app.sources import font_suffixes, left_out, remade
 
 
 class Imports:
@@ -66,11 +65,17 @@ class Imports:
 
     def add_text(self, font: str = "") -> None:
         """Add a text light, to be typed in its panel."""
-        self._add_light(lambda scene: edits.add_text(scene, font=font))
+        with self._messages.guard():
+            self._add_light(*edits.add_text(self._editor.scene, font=font))
 
     def add_drawing(self, path: Path) -> None:
-        """Add an SVG file as a light."""
-        self._add_light(lambda scene: edits.add_drawing(scene, str(path.resolve())))
+        """Add an SVG file as a light, and say what of it is not to be seen."""
+        with self._messages.guard():
+            absolute = str(path.resolve())
+            self._add_light(*edits.add_drawing(self._editor.scene, absolute))
+            missing = left_out(SvgSource(absolute))
+            if missing:
+                self._messages.failure(f"{path.name}: left out {', '.join(missing)}")
 
     def ask_drawing(self) -> None:
         """Ask for an SVG file and add it as a light."""
@@ -101,11 +106,9 @@ class Imports:
                 lambda path: self._make_again(light, replace(drawing, path=str(path.resolve()))),
             )  # fmt: skip
 
-    def _add_light(self, add: Callable[[Scene], tuple[Scene, int]]) -> None:
-        with self._messages.guard():
-            scene, index = add(self._editor.scene)
-            self._editor.apply(step_names.describe(self._editor.scene, scene), scene)
-            self._editor.selection = Selection.light(index)
+    def _add_light(self, scene: Scene, index: int) -> None:
+        self._editor.apply(step_names.describe(self._editor.scene, scene), scene)
+        self._editor.selection = Selection.light(index)
 
     def _make_again(self, light: AreaLight, source: OutlineSource) -> None:
         """Make a light, found by its name, from another source."""

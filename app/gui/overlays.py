@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from app import camera_control as control
 from app import contours, lights, planes
 from app.gui import theme
-from app.scene import AnchorKind, AreaLight, Camera, Contour, Plane, Vec2, Vec3
+from app.scene import AnchorKind, AreaLight, Camera, Plane, Vec2, Vec3
 from app.vectors import add, scale
 
 FloatArray = NDArray[np.float64]
@@ -116,23 +117,21 @@ class Canvas:
     def outline(self, light: AreaLight, colour: ImVec4, alpha: float, thickness: float) -> None:
         """Draw a light's contours, with a dark rim that shows on bright lights."""
         rim, ink = theme.u32(theme.grey(0.0), 0.55 * alpha), theme.u32(colour, alpha)
-        for contour in light.outline.contours:
-            world = self._lines(contour, light.plane)
-            screen = self.sight.view.project_all(self.sight.camera, world)
-            if np.isfinite(screen).all():
-                points: list[Any] = [ImVec2(x, y) for x, y, _ in screen.tolist()]
+        segments = contours.segments_of(light.outline)
+        counts = self.sight.piece_counts(segments.curves, light.plane)
+        world = on_plane(light.plane, contours.subdivide(segments.curves, counts))
+        screen = self.sight.view.project_all(self.sight.camera, world)
+        ends = np.concatenate([[0], np.cumsum(counts)])[list(segments.starts)]
+        for first, last in pairwise(ends.tolist()):
+            if np.isfinite(screen[first:last]).all():
+                points: list[Any] = [ImVec2(x, y) for x, y, _ in screen[first:last].tolist()]
                 closed = imgui.ImDrawFlags_.closed
                 self.draw.add_polyline(points, rim, thickness + 2.0, closed)
                 self.draw.add_polyline(points, ink, thickness, closed)
                 continue
-            corners: list[Vec3] = [(x, y, z) for x, y, z in world.tolist()]
+            corners: list[Vec3] = [(x, y, z) for x, y, z in world[first:last].tolist()]
             for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
                 self.segment(a, b, ink, thickness)
-
-    def _lines(self, contour: Contour, plane: Plane) -> FloatArray:
-        """Return the world corners (n, 3) of lines that look like the contour."""
-        curves = contours.curves_of(contour)
-        return on_plane(plane, contours.subdivide(curves, self.sight.piece_counts(curves, plane)))
 
     def box(self, corners: list[Vec3]) -> None:
         """Draw the edges of a box; bits 1, 2, 4 of a corner's index are x, y, z."""

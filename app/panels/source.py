@@ -21,7 +21,7 @@ from app.panels.widgets import (
     tooltip,
 )
 from app.scene import TEXT_ALIGNS, AreaLight, OutlineSource, SvgSource, TextSource
-from app.sources import remade
+from app.sources import remade, resized
 
 TEXT_LINES = 3
 """Lines of text to be seen at once; more scroll."""
@@ -60,6 +60,8 @@ def source_rows(
     kind = "text" if isinstance(source, TextSource) else "drawing"
     hint(f"Editing the shape itself makes it a shape like any other, without the {kind}.")
     if again or new != source:
+        if not again and new == replace(source, size=new.size):
+            return resized(light, new.size), None
         try:
             return remade(light, new), None
         except InputError as failure:

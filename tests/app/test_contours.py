@@ -86,7 +86,7 @@ def reach(chain: Contour, segment: int, which: int, metric: np.ndarray = contour
 
 @pytest.mark.parametrize("chain", [*chains(), HEART, ROUNDED, DISK, SQUARE])
 def test_bounds_are_those_of_the_curve_not_of_its_handles(chain: Contour) -> None:
-    low, high = contours.bounds(chain)
+    low, high = np.array(contours.bounds(Outline((chain,))))
     sampled = dense(chain)
     assert (sampled >= low - ROUNDING).all()
     assert (sampled <= high + ROUNDING).all()
@@ -433,7 +433,9 @@ def test_a_round_hole_is_round_in_the_world(fill_rule, reverse: bool) -> None:
     metric = planes.metric_from_plane(light.plane)
     away = np.linalg.norm(dense(holed.outline.contours[1], 20) @ metric.T - place, axis=-1)
     assert away == pytest.approx(0.5 * clearance, rel=1e-5)
-    turns, _ = lights._winding_and_clearance(lights._loops(holed)[0], place[None])
+    turns, _ = lights._winding_and_clearance(
+        lights._loops(holed.outline, holed.plane)[0], place[None]
+    )
     assert turns[0] % 2 == 0 if fill_rule == "evenodd" else turns[0] == 0
 
 
