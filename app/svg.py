@@ -28,7 +28,7 @@ from app.errors import InputError
 from app.loops import closed_loop, extent, outline_of
 from app.outline import boundary
 from app.scene import FillRule, Outline, SvgSource
-from app.svg_paths import Box, SvgError, length, shape, transform, view_box
+from app.svg_paths import LARGEST_NUMBER, Box, SvgError, length, shape, transform, view_box
 from app.svg_tree import DEEPEST, Node, all_nodes, read_tree, style_of, style_rules
 
 FloatArray = NDArray[np.float64]
@@ -38,6 +38,9 @@ MOST_ELEMENTS = 200_000
 
 DEFAULT_BOX: Box = (300.0, 150.0)
 """The viewport of a drawing that says nothing about its size, as in CSS."""
+
+SMALLEST = 1e-100
+"""Drawings whose longer side is less are nothing."""
 
 SHAPES = ("path", "rect", "circle", "ellipse", "polygon", "polyline")
 GROUPS = ("g", "a", "switch")
@@ -89,7 +92,8 @@ def read_drawing(source: SvgSource) -> Drawing:
     path = Path(source.path)
     root = read_tree(path)
     collector = _Collector(path, root)
-    collector.draw_root()
+    with np.errstate(all="ignore"):  # what leaves float64 is found where loops are kept
+        collector.draw_root()
     left_out = tuple(
         f"{name} ({count} times)" if count > 1 else name
         for name, count in collector.left_out.items()
@@ -177,11 +181,12 @@ class _Collector:
         if CLEAR.fullmatch(style.get("fill", "")) or _is_zero(style.get("fill-opacity")):
             return
         rule: FillRule = "evenodd" if style.get("fill-rule") == "evenodd" else "nonzero"
-        with np.errstate(all="ignore"):  # what leaves float64 is found below
-            loops = [closed_loop(pieces) for pieces in shape(node.tag, node.attributes, box)]
-            placed = [loop @ matrix[:2, :2].T + matrix[:2, 2] for loop in loops if loop is not None]
-        if not all(np.isfinite(loop).all() for loop in placed):
-            raise SvgError("found coordinates without bounds, expected smaller transforms")
+        loops = [closed_loop(pieces) for pieces in shape(node.tag, node.attributes, box)]
+        placed = [loop @ matrix[:2, :2].T + matrix[:2, 2] for loop in loops if loop is not None]
+        if not all((np.abs(loop) <= LARGEST_NUMBER).all() for loop in placed):
+            raise SvgError(
+                f"found coordinates beyond {LARGEST_NUMBER:g}, expected smaller transforms"
+            )
         self.elements.append(_Element(placed, rule))
 
     def _viewport(
@@ -255,7 +260,7 @@ def _united(elements: list[_Element], size: float) -> Outline | None:
     loops = [loop for element in elements for loop in element.loops]
     low, high = extent(loops) if loops else (np.zeros(2), np.zeros(2))
     longer = float(np.max(high - low))
-    if not longer > 0.0:
+    if not longer > SMALLEST:
         return None
     # Rows of an SVG file run downwards.
     scale = size / longer * np.array([1.0, -1.0])

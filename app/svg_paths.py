@@ -30,6 +30,7 @@ ARC_STEP = math.radians(30.0)
 """The longest turn of one cubic; its radial error is 3.7e-7 (it falls with the sixth power)."""
 
 LARGEST_NUMBER = 1e15
+"""Of coordinates and what moves them; beyond it squares leave float32."""
 
 UNITS = {
     "": 1.0, "px": 1.0, "pt": 96 / 72, "pc": 16.0, "in": 96.0, "cm": 96 / 2.54, "mm": 9.6 / 2.54,

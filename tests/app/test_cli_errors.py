@@ -85,6 +85,12 @@ def bad_mesh(name: str, content: str | bytes | None, *parts: str) -> Case:
     return Case(files, ("objects[1].mesh", *parts))
 
 
+def bad_drawing(elements: str, *parts: str) -> Case:
+    files = {"scene.json": scene(lights=[{}, {"svg": {"path": "a.svg"}}])}
+    drawing = f'<svg xmlns="http://www.w3.org/2000/svg">{elements}</svg>'
+    return Case({**files, "a.svg": drawing}, ("lights[1].svg", "a.svg: ", *parts))
+
+
 def bad_points(content: bytes | str | None, *parts: str) -> Case:
     return Case({"scene.json": scene(), "points.npz": content}, parts, PROBE, "points.npz")
 
@@ -314,6 +320,22 @@ CASES: dict[str, Case] = {
     ),
     "drawing without a path": bad_scene(
         scene(lights=[{"svg": {"size": 1}}]), "lights[0].svg", '"path" is missing'
+    ),
+    "drawing missing": bad_scene(
+        scene(lights=[{"svg": {"path": "gone.svg"}}]),
+        "lights[0].svg", "gone.svg: there is no such file", "(.svg)",
+    ),
+    "drawing is a folder": bad_scene(scene(lights=[{"svg": "."}]), "lights[0].svg", "is a folder"),
+    "drawing is no XML": bad_scene(
+        scene(lights=[{"svg": "scene.json"}]), "scene.json: line 1, column 1: not valid XML"
+    ),
+    "drawing of nothing": bad_drawing("", "nothing filled, expected filled shapes"),
+    "drawing of strokes": bad_drawing(
+        '<path d="M0 0h9v9z" fill="none" stroke="red"/>', "nothing filled but a stroke"
+    ),
+    "mistake in a path": bad_drawing('\n<path d="M0 0Lx"/>', "line 2: <path>", "a number"),
+    "a drawing that copies itself": bad_drawing(
+        '<g id="a"><use href="#a"/></g>', "line 1", "copies of copies"
     ),
     # Meshes
     "misspelt built-in": bad_mesh("spehre", None, "did you mean 'sphere'", ".obj"),
@@ -617,7 +639,7 @@ def test_techniques_are_listed(command: str, capfd: pytest.CaptureFixture[str]) 
     out, err = capfd.readouterr()
     assert err == ""
     lines = out.splitlines()
-    assert [line.split()[0] for line in lines] == ["auto", *TECHNIQUES]
+    assert [line.split()[0].removesuffix("[:N]") for line in lines] == ["auto", *TECHNIQUES]
 
 
 def test_version(capfd: pytest.CaptureFixture[str]) -> None:
