@@ -100,7 +100,8 @@ def test_json_loads(page: Path, text: str) -> None:
 
 def test_documented_defaults_are_the_real_ones() -> None:
     """Every row of docs/scene-file.md whose default is a JSON value."""
-    parts = {"camera": {}, "materials": {"m": {}}, "objects": [{}], "lights": [{}], "display": {}}
+    lights = [{}, {"text": "A"}, {"svg": "a.svg", "outline": {}}]
+    parts = {"camera": {}, "materials": {"m": {}}, "objects": [{}], "lights": lights, "display": {}}
     text = json.dumps({"format": "ltc-scene/1", **parts})
     written = json.loads(scene_to_json(scene_from_json(text, None, "text"), None))
     page = (ROOT / "docs" / "scene-file.md").read_text("utf-8")
@@ -109,10 +110,15 @@ def test_documented_defaults_are_the_real_ones() -> None:
         name = section.split("`")[1]
         part = written[name]
         part = part[0] if isinstance(part, list) else part.get("m", part)
-        for key, default in re.findall(r"^\| `(\w+)` \| `([^`]+)` \|", section, re.MULTILINE):
-            assert part[key] == json.loads(default), f"{name}.{key}"
-            checked += 1
-    assert checked >= 14
+        for of, key, default in re.findall(
+            r"^\| (?:key of `(\w+)`|`(\w+)`) \|(?: `([^`]+)` \|)?", section, re.MULTILINE
+        ):
+            if of:
+                part = next(light[of] for light in written[name] if of in light)
+            elif default:
+                assert part[key] == json.loads(default), f"{name}.{key}"
+                checked += 1
+    assert checked >= 20
 
 
 def test_accuracy_figures_are_those_of_the_shipped_table() -> None:
