@@ -475,7 +475,9 @@ def _speed(curves: FloatArray) -> FloatArray:
 
 
 _NODES = 16
-_MAX_SPLITS = 40
+
+_MAX_SPLITS = 4
+"""Rounds of halving that an error estimate may ask for: what is left then is rounding."""
 
 
 def _integrate(
@@ -662,8 +664,8 @@ def azimuth_form_factor(contours: Sequence[npt.ArrayLike], tolerance: float = 1e
     def short(i: IntArray, t: FloatArray, half: FloatArray) -> BoolArray:
         # The second derivative jumps where z changes sign, so such panels must be tiny.
         before, after = (evaluate(curves[i], t + side * half)[:, 2] > 0.0 for side in (-1.0, 1.0))
-        near = (speed[i] * half) ** 2 > 0.25 * square(evaluate(curves[i], t))
-        return np.asarray(~near & ((before == after) | (half < 1e-5)))
+        reach = np.where(before == after, 0.5, 1e-5)
+        return np.asarray((speed[i] * half) ** 2 <= reach**2 * square(evaluate(curves[i], t)))
 
     def form(i: IntArray, t: FloatArray) -> FloatArray:
         c = curves[i, None]
@@ -716,10 +718,30 @@ def guided_form_factor(
 
     Notes
     -----
-    Where the curve was straight, |r|^2 would vanish at t = m - r.r'/|r'|^2 +- i |r x r'|/|r'|^2.
-    With w that place in units of the panel's half width, rho = |w + sqrt(w^2 - 1)|, and n nodes
-    err like rho^(-2n). The pole is estimated at the panel's middle; no
-    threshold depends on roughness.
+    If the curve was straight, |r|^2 would vanish at t - r.r'/|r'|^2 +- i |r x r'|/|r'|^2. With w
+    that place in units of the panel's half width from its middle, rho = |w + sqrt(w^2 - 1)|,
+    and n nodes err like rho^(-2n). The pole is estimated from the panel's start, middle
+    and end: the middle alone misses what a curve that bends comes close to with its
+    ends. No threshold depends on roughness.
+
+    Errors of circle, heart, glyph and ring about the mirror direction under the lobes
+    of the table, theta 0 to 85 degrees, many through the horizon, 1,000 lights each:
+
+    ================================  ==========  ==========  ==========  =============
+    rule, 1/rho <= .5                 alpha .001  alpha .01   alpha .1    alpha .5
+    ================================  ==========  ==========  ==========  =============
+    three estimates, 8 nodes: p95     4.5e-6      4.0e-6      2.5e-6      8.7e-7
+    largest                           1.1e-5      1.1e-5      8.5e-6      6.1e-6
+    evaluations a light               87          85          73          59
+    three estimates, 6 nodes: p95     8.2e-5      8.2e-5      4.9e-5      1.8e-5
+    largest                           1.8e-4      1.7e-4      1.7e-4      1.0e-4
+    evaluations a light               65          63          55          44
+    middle alone, 8 nodes: p95        6.1e-4      4.8e-4      6.3e-5      3.4e-6
+    largest                           .69         .53         .075        .0012
+    evaluations a light               79          77          67          56
+    the roots themselves, 8 nodes:    1.2e-5      1.2e-5      8.1e-6      4.2e-6
+    largest, evaluations a light      82          80          69          57
+    ================================  ==========  ==========  ==========  =============
     """
     curves, light, shape = _flat(contours)
     n = int(np.prod(shape))
@@ -728,8 +750,11 @@ def guided_form_factor(
 
     def guided(c: FloatArray) -> tuple[FloatArray, FloatArray]:
         def ready(i: IntArray, m: FloatArray, half: FloatArray) -> BoolArray:
-            r, dr = evaluate(c[i], m), derivative(c[i], m)
-            return _rho(r, dr, half) >= 1.0 / limit
+            ok = np.ones(i.shape, dtype=np.bool_)
+            for side in (-1.0, 0.0, 1.0):
+                t = m + side * half
+                ok &= _rho(evaluate(c[i], t), derivative(c[i], t), half, side) >= 1.0 / limit
+            return ok
 
         item, lo, hi = panels(np.ones(c.shape[0]), ready)
         x, w = gauss_legendre(nodes)
@@ -748,16 +773,16 @@ def guided_form_factor(
     return value, evaluations.reshape(shape)
 
 
-def _rho(r: FloatArray, dr: FloatArray, half: FloatArray) -> FloatArray:
-    """Return the size rho of the ellipse about [-half, half] through the poles of 1/|r + s dr|^2.
+def _rho(r: FloatArray, dr: FloatArray, half: FloatArray, side: float) -> FloatArray:
+    """Return the size rho of the ellipse about [-half, half] through a pole.
 
-    Large where the velocity vanishes.
+    The pole is that of 1/|r + (s - side half) dr|^2. Large where the velocity vanishes.
     """
     cross = np.cross(r, dr)
     reach = half * _square(dr)
     tiny = reach <= 1e-12 * np.sqrt(_square(r) * _square(dr))
     reach = np.where(tiny, 1.0, reach)
-    w = (-np.sum(r * dr, axis=-1) + 1j * np.sqrt(_square(cross))) / reach
+    w = side + (1j * np.sqrt(_square(cross)) - np.sum(r * dr, axis=-1)) / reach
     root = np.sqrt(w * w - 1.0)
     rho = np.maximum(np.abs(w + root), np.abs(w - root))
     return np.asarray(np.where(tiny, 1e12, rho))
