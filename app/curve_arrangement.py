@@ -44,7 +44,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-TOUCHES = (1e-11, 1e-9, 1e-7)
+TOUCHES = (1e-11, 1e-9, 1e-8, 1e-7, 1e-6)
 """Distances in half extents within which curves meet, tried in turn."""
 
 LAST_RESORT = 1e-6
@@ -57,8 +57,9 @@ NEWTON_ROUNDS = 8
 """From the middle of two parts that cross once; four are usual."""
 
 MAX_DEPTH = 60
-MAX_PARTS = 200_000
-"""Of the bisection; more means curves that run closely side by side for long."""
+MAX_PARTS = 20_000
+"""Of the bisection, and as many more for each thousand pairs; what exceeds it are curves
+that run side by side for long, closer than its square: a larger distance joins them."""
 
 LONG_TOUCH = 1e-3
 """Half extents from which a touching stretch is cut at both ends and not in its middle."""
@@ -128,6 +129,9 @@ def _normal_form(chain: FloatArray) -> FloatArray:
     chain = chain[np.any(chain != chain[:, :1], axis=(1, 2))]
     if not len(chain):
         return chain
+    straight = curves.is_straight(chain)
+    lines = curves.line_as_cubic(chain[:, 0], chain[:, 3])
+    chain = np.where(straight[:, None, None], lines, chain)
     from_start = chain - chain[:, :1]
     lengths = np.hypot(from_start[..., 0], from_start[..., 1])
     farthest = np.argmax(lengths, axis=1)
@@ -135,7 +139,7 @@ def _normal_form(chain: FloatArray) -> FloatArray:
     direction = from_start[rows, farthest] / lengths[rows, farthest][:, None]
     off = np.max(np.abs(cross(direction[:, None], from_start)), axis=1)
     rounding = 4.0 * np.finfo(np.float64).eps * np.max(np.abs(chain), axis=(1, 2))
-    collinear = off <= curves.STRAIGHT * lengths[rows, farthest] + rounding
+    collinear = (off <= curves.STRAIGHT * lengths[rows, farthest] + rounding) & ~straight
     if not np.any(collinear):
         return chain
     result = []
@@ -195,6 +199,7 @@ def _parameter_at(p: FloatArray, value: FloatArray) -> FloatArray:
     a, b, c = p1 - p0, p2 - p1, p3 - p2
     rising = p3 > p0
     span = p3 - p0
+    rounding = np.finfo(np.float64).eps * np.maximum(np.abs(p0), np.abs(p3))
     low, high = np.zeros(len(p)), np.ones(len(p))
     t = np.clip((value - p0) / np.where(span == 0.0, 1.0, span), 0.0, 1.0)
     for _ in range(ROOT_ROUNDS):
@@ -207,7 +212,7 @@ def _parameter_at(p: FloatArray, value: FloatArray) -> FloatArray:
         following = t + (value - here) / slope
         outside = ~((following > low) & (following < high))
         following = np.where(outside, 0.5 * (low + high), following)
-        following = np.where(here == value, t, following)
+        following = np.where(np.abs(here - value) <= rounding, t, following)
         if np.all(np.abs(following - t) <= 1e-15):
             break
         t = following
@@ -411,11 +416,13 @@ def _cross_pieces(
     whole = np.tile([0.0, 1.0], (count, 1))
     parts = _Parts(np.arange(count), p[one], p[two], whole, whole)
     touching: list[_Parts] = []
+    left_to_do = MAX_PARTS * (1.0 + 1e-3 * count)
     for _ in range(MAX_DEPTH):
         parts = parts[_may_meet(parts.a, parts.b, known[parts.pair], touch)]
         if not len(parts.pair):
             break
-        if len(parts.pair) > MAX_PARTS:
+        left_to_do -= len(parts.pair)
+        if left_to_do < 0.0:
             raise _InconsistentError
         transversal = _is_transversal(parts.a, parts.b)
         done = np.zeros(len(transversal), dtype=bool)
@@ -445,7 +452,7 @@ def _cross_pieces(
     else:
         raise _InconsistentError
     if touching:
-        _add_touches(p, one, two, known, touching, touch, found)
+        _add_touches(p, one, two, touching, touch, found)
 
 
 def _size(controls: FloatArray) -> FloatArray:
@@ -523,53 +530,66 @@ def _add_touches(
     p: FloatArray,
     one: IntArray,
     two: IntArray,
-    known: FloatArray,
     touching: list[_Parts],
     touch: float,
     found: _Meetings,
 ) -> None:
-    """Join parts that touch to stretches, and cut the pieces once there, or at both ends."""
+    """Join parts that touch to stretches, and let both pieces have the same vertices there.
+
+    Where pieces touch like curves of the same tangent, they are indistinguishable
+    over the square root of the distance of touching. A vertex that one has in such
+    a stretch the other gets too; only without any a new one is made in its middle.
+    Several pieces that touch in one place thus share one vertex.
+    """
     pair = np.concatenate([parts.pair for parts in touching])
     range_a = np.concatenate([parts.range_a for parts in touching])
     range_b = np.concatenate([parts.range_b for parts in touching])
     order = np.lexsort((range_a[:, 0], pair))
     pair, range_a, range_b = pair[order], range_a[order], range_b[order]
-    first = 0
-    cuts: list[tuple[int, float]] = []
-    while first < len(pair):
-        last, end = first, range_a[first, 1]
-        while (
-            last + 1 < len(pair)
-            and pair[last + 1] == pair[first]
-            and range_a[last + 1, 0] <= end + 1e-12
-        ):
-            last += 1
-            end = max(end, range_a[last, 1])
-        index = int(pair[first])
-        stops = np.array([range_a[first, 0], 0.5 * (range_a[first, 0] + end), end])
-        points = curves.evaluate(p[one[index]], stops)
-        length = float(np.max(np.abs(points[2] - points[0])))
-        if length > LONG_TOUCH:
-            cuts += [(index, stops[0]), (index, stops[2])]
-        else:
-            reach = np.nanmin(
-                np.max(np.abs(known[index] - points[1]), axis=1),
-                initial=np.inf,
-            )
-            if not reach <= 2.0 * length + 16.0 * touch:
-                cuts.append((index, stops[1]))
-        first = last + 1
-    if cuts:
-        index_array = np.array([index for index, _ in cuts])
-        s = np.array([stop for _, stop in cuts])
-        a, b = one[index_array], two[index_array]
-        point = curves.evaluate(p[a], s)
-        t = _parameter_along(p[b], point)
-        off = curves.evaluate(p[b], t) - point
-        # Ends of a stretch are ends of parts, which may reach beyond the other piece.
-        near = np.hypot(off[:, 0], off[:, 1]) <= 8.0 * touch
-        found.add(a[near], s[near], point[near])
-        found.add(b[near], t[near], point[near])
+    involved = np.unique(np.concatenate((one[pair], two[pair])))
+    cuts: dict[int, list[tuple[float, FloatArray]]] = {
+        index: [(0.0, p[index, 0]), (1.0, p[index, 3])] for index in involved.tolist()
+    }
+    for piece, t, point in zip(found.piece, found.t, found.point, strict=True):
+        for row in np.flatnonzero(np.isin(piece, involved)).tolist():
+            cuts[int(piece[row])].append((float(t[row]), point[row]))
+
+    def share(host: int, point: FloatArray) -> bool:
+        """Cut a piece at a point of another one, if it is on both."""
+        place = _parameter_along(p[host][None], point[None])
+        if np.hypot(*(curves.evaluate(p[host], place[0]) - point)) > 4.0 * touch:
+            return False
+        found.add(np.array([host]), place, point[None])
+        cuts[host].append((float(place[0]), point))
+        return True
+
+    begins = np.ones(len(pair), dtype=bool)
+    begins[1:] = pair[1:] != pair[:-1]
+    # Ends of the parts so far: within a pair, parts in order of their beginnings.
+    for row in range(1, len(pair)):
+        if not begins[row]:
+            begins[row] = range_a[row, 0] > range_a[row - 1, 1] + 1e-12
+            range_a[row, 1] = max(range_a[row, 1], range_a[row - 1, 1])
+    firsts = np.flatnonzero(begins)
+    lasts = np.append(firsts[1:], len(pair)) - 1
+    for first, last in zip(firsts.tolist(), lasts.tolist(), strict=True):
+        a, b = int(one[pair[first]]), int(two[pair[first]])
+        s0, s1 = float(range_a[first, 0]), float(range_a[last, 1])
+        t0 = float(range_b[first : last + 1, 0].min())
+        t1 = float(range_b[first : last + 1, 1].max())
+        shared = False
+        for here, other, low, high in ((a, b, s0, s1), (b, a, t0, t1)):
+            length = high - low
+            for t, point in list(cuts[here]):
+                if low - length <= t <= high + length:
+                    shared |= share(other, point)
+        ends = curves.evaluate(p[a], np.array([s0, s1]))
+        is_long = float(np.max(np.abs(ends[1] - ends[0]))) > LONG_TOUCH
+        for s in (s0, s1) if is_long else () if shared else (0.5 * (s0 + s1),):
+            point = curves.evaluate(p[a], s)
+            if share(b, point):
+                found.add(np.array([a]), np.array([s]), point[None])
+                cuts[a].append((s, point))
 
 
 # Edges between vertices

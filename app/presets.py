@@ -30,6 +30,7 @@ SYMMETRIC: AnchorKind = "symmetric"
 
 def disk(radius: float = 1.0) -> Outline:
     """Return a disk; radius above 0."""
+    _positive(radius=radius)
     return ellipse(radius, radius)
 
 
