@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from app.curves import derivative, evaluate, is_straight, split
+from app.curves import derivative, evaluate, is_straight, signed_areas, split
 
 FloatArray = NDArray[np.float64]
 
@@ -53,6 +53,9 @@ class TreeNodes:
     area : (n,) float64
         At least the area between node and chord, overlaps counted as often as
         they are wound around; 0 for straight leaves.
+    signed_area : (n,) float64
+        The same where areas to the right of the chord count positive and those to
+        the left negative.
     skip : (n,) int64
         Index of the first node after the subtree.
     is_leaf : (n,) bool
@@ -61,6 +64,7 @@ class TreeNodes:
     curves: FloatArray
     disc: FloatArray
     area: FloatArray
+    signed_area: FloatArray
     skip: NDArray[np.int64]
     is_leaf: NDArray[np.bool_]
 
@@ -74,8 +78,27 @@ def contour_tree(loops: Sequence[FloatArray]) -> TreeNodes:
         np.array(builder.curves).reshape(count, 4, 2),
         np.array(builder.disc).reshape(count, 3),
         np.array(builder.area),
+        np.array(builder.signed_area),
         np.array(builder.skip, dtype=np.int64),
         np.array(builder.is_leaf, dtype=bool),
+    )
+
+
+def curve_list(loops: Sequence[FloatArray]) -> TreeNodes:
+    """Return the curves of closed loops uncut and without inner nodes.
+
+    For the published methods of integration, which take every curve whole.
+    """
+    curves = np.concatenate([np.zeros((0, 4, 2)), *loops])
+    center = 0.5 * (curves.min(axis=1) + curves.max(axis=1))
+    radius = np.sqrt(((curves - center[:, None]) ** 2).sum(axis=-1).max(axis=1, initial=0.0))
+    return TreeNodes(
+        curves,
+        np.column_stack([center, radius]),
+        np.where(is_straight(curves), 0.0, _unsigned_areas(curves)),
+        signed_areas(curves - curves[:, :1]),
+        np.arange(1, len(curves) + 1),
+        np.ones(len(curves), dtype=bool),
     )
 
 
@@ -129,6 +152,7 @@ class _Builder:
         self.curves: list[FloatArray] = []
         self.disc: list[FloatArray] = []
         self.area: list[float] = []
+        self.signed_area: list[float] = []
         self.skip: list[int] = []
         self.is_leaf: list[bool] = []
 
@@ -165,6 +189,7 @@ class _Builder:
         self.curves.append(np.array([start, (0.0, 0.0), (0.0, 0.0), end]))
         self.disc.append(np.array([*center, radius]))
         self.area.append(0.0)
+        self.signed_area.append(float(np.sum(signed_areas(leaves - start))))
         self.skip.append(0)
         self.is_leaf.append(False)
         return len(self.area) - 1

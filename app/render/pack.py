@@ -1,4 +1,4 @@
-"""Scene data as the GPU reads it: arrays of vec4 "texels", and vertices of visible lights.
+"""Scene data as the GPU reads it: arrays of vec4 "texels".
 
 Lights and materials are plain vec4 arrays. In a uniform block std140 gives such
 an array a stride of 16 bytes, the same as rows of an RGBA32F texture, so one
@@ -11,7 +11,7 @@ Everything is computed in float64 and rounded once.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from app.curves import derivative, evaluate, line_as_cubic
 from app.errors import InputError
-from app.outline import boundary, resolve, triangulate
+from app.outline import boundary, resolve
 from app.render.caching import ByteCache
-from app.render.contour_tree import contour_tree
+from app.render.contour_tree import TreeNodes, contour_tree, curve_list
 from app.scene import AreaLight, BezierContour, Material, Plane
 
 FloatArray = NDArray[np.float64]
@@ -60,9 +60,6 @@ MATERIAL_RECORD = np.dtype(
     ]
 )
 """Three texels, one record per object."""
-
-LIGHT_VERTEX = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("id", "<f4")])
-"""A vertex of a visible light: world position, emitting normal, G-buffer id."""
 
 TEXELS_PER_LIGHT = LIGHT_HEADER.itemsize // 16
 TEXELS_PER_MATERIAL = MATERIAL_RECORD.itemsize // 16
@@ -209,14 +206,15 @@ def edges_of(loops: Sequence[FloatArray]) -> FloatArray:
     )
 
 
-def pack_lights(lights: Sequence[AreaLight]) -> NDArray[np.float32]:
+def pack_lights(lights: Sequence[AreaLight], whole: bool = False) -> NDArray[np.float32]:
     """Return (n, 4) float32 texels: all headers, then all edges, or all nodes.
 
     If one light has curves (`has_curves`) every light's outline becomes a tree, so
     that one walk serves all. A light without radiance keeps its header and gets no
-    outline: nothing to integrate.
+    outline: nothing to integrate. ``whole`` leaves curves uncut and without a tree
+    over them, for techniques that take them so.
     """
-    pack = _packed_tree if has_curves(lights) else _packed_edges
+    pack = (_packed_whole if whole else _packed_tree) if has_curves(lights) else _packed_edges
     packed = [pack(light) for light in lights]
     header = np.concatenate([np.zeros(0, LIGHT_HEADER), *(record for record, _ in packed)])
     counts = np.array([len(parts) for _, parts in packed], dtype=np.int64)
@@ -226,9 +224,9 @@ def pack_lights(lights: Sequence[AreaLight]) -> NDArray[np.float32]:
     return np.concatenate([texels, *(parts for _, parts in packed)])
 
 
-def node_count(light: AreaLight) -> int:
-    """Return the nodes of a light's tree, see `app.render.contour_tree`."""
-    return len(_packed_tree(light)[1]) // TEXELS_PER_NODE
+def node_count(light: AreaLight, whole: bool = False) -> int:
+    """Return the nodes of a light's tree, see `app.render.contour_tree`, or its whole curves."""
+    return len((_packed_whole if whole else _packed_tree)(light)[1]) // TEXELS_PER_NODE
 
 
 Packed = tuple[NDArray[np.void], NDArray[np.float32]]
@@ -242,6 +240,14 @@ def _pack_edges(light: AreaLight) -> Packed:
 
 
 def _pack_tree(light: AreaLight) -> Packed:
+    return _pack_nodes(light, contour_tree)
+
+
+def _pack_whole(light: AreaLight) -> Packed:
+    return _pack_nodes(light, curve_list)
+
+
+def _pack_nodes(light: AreaLight, nodes_of: Callable[[Sequence[FloatArray]], TreeNodes]) -> Packed:
     geometry = light_geometry(light)
     if not geometry.loops or not any(light.radiance):
         return _header(light, geometry, 0), np.zeros((0, 4), np.float32)
@@ -249,7 +255,7 @@ def _pack_tree(light: AreaLight) -> Packed:
         loop if loop.ndim == 3 else line_as_cubic(loop, np.roll(loop, -1, axis=0))
         for loop in geometry.loops
     ]
-    tree = contour_tree(curves)
+    tree = nodes_of(curves)
     ends = tree.curves[:, [0, 3]].reshape(-1, 4)
     texels = np.zeros((len(ends), TEXELS_PER_NODE, 4), np.float32)
     texels[:, 0], texels[:, 1] = _split(ends)
@@ -262,6 +268,7 @@ def _pack_tree(light: AreaLight) -> Packed:
     inner = ~tree.is_leaf
     texels[inner, 2, 3] = -texels[inner, 2, 3] - np.float32(SMALLEST_AREA)
     texels[inner, 3, 0] = tree.skip[inner]
+    texels[inner, 3, 1] = tree.signed_area[inner]
     return _header(light, geometry, len(ends)), texels.reshape(-1, 4)
 
 
@@ -299,48 +306,8 @@ def pack_materials(materials: Sequence[Material]) -> NDArray[np.float32]:
     return records.view(np.float32).reshape(-1, 4)
 
 
-@dataclass(frozen=True, eq=False)
-class LightShapes:
-    """Triangles of the visible lights, counter-clockwise seen from the emitting side.
-
-    ``vertices[:one_sided]`` show that side only, the rest both sides.
-    """
-
-    vertices: NDArray[np.void]
-    one_sided: int
-
-
-def pack_light_shapes(lights: Sequence[AreaLight]) -> LightShapes:
-    """Return the triangles of all visible lights; light i has the id -1 - i."""
-    one: list[NDArray[np.void]] = []
-    two: list[NDArray[np.void]] = []
-    for index, light in enumerate(lights):
-        if light.visible:
-            (two if light.two_sided else one).append(_triangles(light, index))
-    vertices = np.concatenate([np.zeros(0, dtype=LIGHT_VERTEX), *one, *two])
-    return LightShapes(vertices, sum(len(part) for part in one))
-
-
-def _light_triangles(light: AreaLight, index: int) -> NDArray[np.void]:
-    points, triangles = triangulate(light.outline)
-    e1, e2, to_metres = plane_basis(light.plane)
-    plane = points @ to_metres.T
-    positions = np.array(light.plane.origin) + plane[:, :1] * e1 + plane[:, 1:] * e2
-    vertices = np.zeros(3 * len(triangles), dtype=LIGHT_VERTEX)
-    vertices["position"] = positions[_counter_clockwise(points, triangles).reshape(-1)]
-    vertices["normal"] = np.cross(e1, e2)
-    vertices["id"] = -1 - index
-    return vertices
-
-
-def _counter_clockwise(points: FloatArray, triangles: NDArray[np.int32]) -> NDArray[np.int32]:
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return np.where(area[:, None] < 0.0, triangles[:, ::-1], triangles)
-
-
 # Hashing and per-entry overhead are worth about 1 KB.
 _geometries = ByteCache(_checked_geometry, lambda g: 1024 + g.bytes, CACHED_BYTES)
 _packed_edges = ByteCache(_pack_edges, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
 _packed_tree = ByteCache(_pack_tree, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
-_triangles = ByteCache(_light_triangles, lambda t: 1024 + t.nbytes, CACHED_BYTES)
+_packed_whole = ByteCache(_pack_whole, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)

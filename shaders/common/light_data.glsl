@@ -13,7 +13,8 @@
 // four texels a node in depth-first order:
 //   0, 1: its ends, as an edge's
 //   2: disc around it: center.st, radius; area between node and chord, negative for inner nodes
-//   3: leaves: both handles from their ends; inner nodes: the node after the subtree
+//   3: leaves: both handles from their ends; inner nodes: the node after the subtree, and the
+//      area between node and chord, to the right of the chord positive
 //
 // Twice float32, because a point a millimetre from an outline metres away sees a
 // rounding of its coordinates (1e-7 m) as 1e-4 rad, a tenth of a sharp lobe.

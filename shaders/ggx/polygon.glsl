@@ -229,6 +229,10 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
 }
 
 #if HAS_CURVES
+// Largest radiance that a chord may be wrong by, of a light of radiance 1: chords of one curve
+// err to the same side, and nothing is added for what lies between.
+const float GGX_CHORD_ERROR = 1e-5;
+
 // Upper bound of the lobe's integral over an area [m^2] inside a disc (center, radius) about
 // the light's origin: GGX's density |h|^4 / (2 pi ax ay (|bent| + bent.z) |h'|^4), h = v + o,
 // times depth / distance^3.
@@ -280,7 +284,7 @@ bool ggx_contour_edge(
     }
     bool is_chord = contour.halvings == MOST_CHORD_HALVINGS ||
                     ggx_integral_bound(about, view, depth, disc,
-                                       node.area * scale * scale * scale) <= CHORD_ERROR;
+                                       node.area * scale * scale * scale) <= GGX_CHORD_ERROR;
     if (!is_chord) {
         contour.next += node.is_inner ? 1 : 0;
         contour.halvings += node.is_inner ? 0 : 1;

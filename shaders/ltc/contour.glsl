@@ -144,49 +144,82 @@ float light_form_factor(
 
 #else
 
-// Largest radiance that a node's chord may be wrong by, of a light of radiance 1.
-const float CHORD_ERROR = 1e-5;
+// Largest radiance that a node's chord may be wrong by, of a light of radiance 1. The bound
+// is far from tight: outlines err by a tenth of this altogether.
+const float CHORD_ERROR = 1e-4;
 
-// What bounds the cosine lobe's density over parts of a light's plane.
-struct LobeBound {
+// The cosine lobe's density over a light's plane [1/m^2]: scale z / |r|^4.
+struct LobeDensity {
     CosineLight lobe;
-    float scale;     // density [1/m^2] = scale z / |r|^4
+    float scale;     // negative where the outline is clockwise about the lobe's z
     float distance;  // of the transformed plane
     float stretch;   // lengths grow by this at most
     float rise;      // z grows by this at most, per metre
 };
 
-LobeBound lobe_bound(CosineLight lobe)
+LobeDensity lobe_density(CosineLight lobe)
 {
     float uu = dot(lobe.u, lobe.u);
     float vv = dot(lobe.v, lobe.v);
     float uv = dot(lobe.u, lobe.v);
-    float volume = abs(dot(lobe.center, lobe.u_cross_v));
+    float volume = dot(lobe.center, lobe.u_cross_v);
     // The larger eigenvalue of the Gram matrix.
     float stretch2 = 0.5 * (uu + vv + length(vec2(uu - vv, 2.0 * uv)));
-    return LobeBound(lobe, 0.318309886 * volume, volume / length(lobe.u_cross_v),
-                     sqrt(stretch2), length(vec2(lobe.u.z, lobe.v.z)));
+    return LobeDensity(lobe, 0.318309886 * volume, abs(volume) / length(lobe.u_cross_v),
+                       sqrt(stretch2), length(vec2(lobe.u.z, lobe.v.z)));
 }
 
-// Upper bound of the lobe's integral over an area [m^2] inside a disc (center, radius) about
-// the light's origin.
-float integral_bound(LobeBound bound, vec3 disc, float area)
+// Integral of the lobe over what lies between a part of the outline and its chord: the
+// density at one point times the area, and how far that may be off.
+struct SliverIntegral {
+    float value;
+    float error;
+};
+
+// `disc`: center about the light's origin, and radius. `area`: at least that of the sliver,
+// `signed_area` what it adds up to. Parts below the surface have no value, only an error.
+SliverIntegral sliver_integral(
+    LobeDensity density, vec3 disc, float area, float signed_area, bool above_surface)
 {
-    vec2 at = disc.xy - bound.lobe.anchor;
-    vec3 center = bound.lobe.center + at.x * bound.lobe.u + at.y * bound.lobe.v;
-    float top = center.z + disc.z * bound.rise;
-    float near = max(length(center) - disc.z * bound.stretch, bound.distance);
+    vec2 at = disc.xy - density.lobe.anchor;
+    vec3 center = density.lobe.center + at.x * density.lobe.u + at.y * density.lobe.v;
+    float distance = length(center);
+    float reach = disc.z * density.stretch;
+    float near = max(distance - reach, density.distance);
+    float far = distance + reach;
+    float top = center.z + disc.z * density.rise;
+    float bottom = center.z - disc.z * density.rise;
     float near2 = near * near;
-    return top <= 0.0 ? 0.0 : area * bound.scale * top / (near2 * near2);
+    float far2 = far * far;
+    float distance2 = distance * distance;
+    float scale = abs(density.scale);
+    float most = top <= 0.0 ? 0.0 : scale * top / (near2 * near2);
+    bool has_value = above_surface && bottom > 0.0;
+    float least = has_value ? scale * bottom / (far2 * far2) : 0.0;
+    float value = has_value ? density.scale * center.z / (distance2 * distance2) : 0.0;
+    return SliverIntegral(value * signed_area, (most - least) * area);
+}
+
+// Between a cubic and its chord of ends a, b; handles from the ends, chord d = b - a.
+float sliver_area(vec4 handles, vec2 d)
+{
+    vec2 a = handles.xy;
+    vec2 b = handles.zw;
+    float a_d = a.x * d.y - a.y * d.x;
+    float b_d = b.x * d.y - b.y * d.x;
+    float a_b = a.x * b.y - a.y * b.x;
+    return 0.3 * (a_d + b_d) + 0.15 * a_b;
 }
 
 // A node of the outline's tree.
 struct ContourNode {
-    vec3 disc;      // around it and its chord: center about the light's origin, radius
-    float area;     // at least between it and its chord
+    vec3 disc;          // around it and its chord: center about the light's origin, radius
+    float area;         // at least between it and its chord
+    float signed_area;  // and what that adds up to, positive to the right of the chord
     bool is_inner;
-    int after;      // the node after its subtree
-    vec4 handles;   // of leaves
+    bool above;         // all of it is above the surface
+    int after;          // the node after its subtree
+    vec4 handles;       // of leaves
 };
 
 // The node where the walk is; false if none of it is above the surface.
@@ -194,21 +227,26 @@ bool contour_node(
     PlanarLight light, CosineLight anchored, inout Contour contour, out ContourNode node)
 {
     int texel = light.first_part + 4 * contour.next;
+    vec4 ends = light_texel(texel);
     vec4 about = light_texel(texel + 2);
     node.disc = about.xyz;
     node.area = abs(about.w);
     node.is_inner = about.w < 0.0;
     node.handles = light_texel(texel + 3);
     node.after = node.is_inner ? int(node.handles.x) : contour.next + 1;
+    node.signed_area =
+        node.is_inner ? node.handles.y : sliver_area(node.handles, ends.zw - ends.xy);
     vec2 at = about.xy - anchored.anchor;
     float steepness = length(contour.slope);
-    float highest = height_of(contour, at) + about.z * steepness;
+    float height = height_of(contour, at);
+    float reach = about.z * steepness;
     // Safely below: ends that are shared with other nodes must not be judged differently.
     float margin = 1e-5 * (abs(contour.base) + steepness * (length(at) + about.z));
-    if (highest < -margin) {
+    if (height + reach < -margin) {
         contour.next = node.after;
         return false;
     }
+    node.above = height - reach > margin;
     return true;
 }
 
@@ -223,6 +261,7 @@ PlanarEdge node_chord(PlanarLight light, CosineLight anchored, Contour contour)
 // A straight or curved part of the outline about the anchor, above the surface.
 struct ContourPart {
     PlanarEdge edge;
+    float sliver;      // the lobe's integral between the edge and what it stands for
     PlanarCurve curve;
     float from;
     float to;
@@ -231,10 +270,11 @@ struct ContourPart {
 
 // The next part; false where there is none above the surface, or only further down the tree.
 bool contour_part(
-    PlanarLight light, CosineLight anchored, LobeBound bound, inout Contour contour,
+    PlanarLight light, CosineLight anchored, LobeDensity density, inout Contour contour,
     out ContourPart part)
 {
     part.is_curve = false;
+    part.sliver = 0.0;
     if (contour.closing) {
         part.edge = closing_edge(contour);
         return true;
@@ -243,7 +283,14 @@ bool contour_part(
     if (!contour_node(light, anchored, contour, node)) {
         return false;
     }
-    bool is_chord = integral_bound(bound, node.disc, node.area) <= CHORD_ERROR;
+    SliverIntegral sliver =
+        sliver_integral(density, node.disc, node.area, node.signed_area, node.above);
+#if CURVE_RULE
+    // The published methods take every curve.
+    bool is_chord = node.area == 0.0;
+#else
+    bool is_chord = sliver.error <= CHORD_ERROR;
+#endif
     if (node.is_inner && !is_chord) {
         ++contour.next;
         return false;
@@ -251,6 +298,7 @@ bool contour_part(
     part.edge = node_chord(light, anchored, contour);
     if (is_chord) {
         contour.next = node.after;
+        part.sliver = sliver.value;
         return clip_edge(contour, part.edge);
     }
     part.is_curve = true;
@@ -302,12 +350,12 @@ float light_form_factor(
     PlanarLight light, CosineTransform transform, PlaneView view, vec3 normal)
 {
     CosineLight transformed = cosine_light(transform, light, view);
-    LobeBound bound = lobe_bound(transformed);
+    LobeDensity density = lobe_density(transformed);
     Contour contour = contour_start(light, view, transformed, normal);
     ContourSum sum = ContourSum(0.0, 0.0, 0.0);
     while (!contour_ends(light, contour)) {
         ContourPart part;
-        if (contour_part(light, transformed, bound, contour, part)) {
+        if (contour_part(light, transformed, density, contour, part)) {
             if (part.is_curve) {
 #if CURVE_RULE
                 add_divided_curve(transformed, part.curve, part.from, part.to, sum);
@@ -316,6 +364,7 @@ float light_form_factor(
 #endif
             } else {
                 add_edge(transformed, part.edge, sum);
+                sum.angle += 6.28318530718 * part.sliver;
             }
         }
     }

@@ -1,12 +1,11 @@
-// Contour integral of the form factor along cubic Bézier curves. Twin: ltc.curve.
+// Contour integral of the form factor along cubic Bézier curves. Truth: ltc.bezier.
 //
 // In the cosine's frame the integrand (x y' - y x') / |r|^2 is rational in the curve's
 // parameter; how fast Gauss-Legendre converges is decided by the nearest complex root of
 // |r(t)|^2, its pole. Leaves of the tree (app/render/contour_tree.py) turn so little
-// that the pole seen from the middle, as if the curve went straight on, is near the true
-// one. A panel whose pole is near is halved, else four nodes integrate it.
-// Tried and left (ltc.curve has the figures): more nodes for nearer poles, and
-// t = a + b sinh(w) about the pole a + ib, which cost more for the same error.
+// that the pole as seen from a place near it, as if the curve went straight on, is near the
+// true one. A panel that sees a pole nearby from its outer nodes is halved, else its four
+// nodes integrate it. docs/curves.md has the figures, and those of what was tried and left.
 // Parts below the cosine's horizon are replaced by their azimuth, as with edges. (The
 // nadir, opposite to the lobe's axis, is below the surface, so it cannot lie between a part
 // above the surface and its chord: the chord's azimuth is the curve's.)
@@ -94,24 +93,50 @@ float next_crossing(vec4 z, float from, float to, bool above)
         lo = before ? t : lo;
         hi = before ? hi : t;
         float newton = t - value / slope;
-        // Before the bracket is asked: at the root Newton stays on its end.
-        if (abs(newton - t) < 1e-7) {
+        float inside = clamp(newton, lo, hi);
+        bool is_close = abs(newton - inside) < 1e-6;
+        bool is_done = is_close && abs(inside - t) < 1e-7;
+        // A root at the bracket's very end may be seen beyond it.
+        t = is_close ? inside : 0.5 * (lo + hi);
+        if (is_done) {
             break;
         }
-        t = newton > lo && newton < hi ? newton : 0.5 * (lo + hi);
     }
-    return t;
+    // Before `to`, which says that there is none.
+    return min(t, 0.9999999 * to);
 }
 
-// The integrand at t, above the cosine's horizon.
-float curve_form(CosineLight light, PowerCurve curve, float t)
+// A place on a curve as the integral sees it.
+struct CurveNode {
+    vec3 r;         // in the cosine's frame
+    vec3 r_way;     // dr/dt
+    vec3 moment;    // r x r_way, without its cancellation
+};
+
+CurveNode curve_node(CosineLight light, PowerCurve curve, float t)
 {
     vec2 p = curve_point(curve, t);
     vec2 way = curve_way(curve, t);
-    vec3 r = light.center + p.x * light.u + p.y * light.v;
-    float w_z = way.x * light.center_cross_u.z + way.y * light.center_cross_v.z +
-                (p.x * way.y - p.y * way.x) * light.u_cross_v.z;
-    return w_z / max(dot(r, r), 1e-30);
+    CurveNode node;
+    node.r = light.center + p.x * light.u + p.y * light.v;
+    node.r_way = way.x * light.u + way.y * light.v;
+    node.moment = way.x * light.center_cross_u + way.y * light.center_cross_v +
+                  (p.x * way.y - p.y * way.x) * light.u_cross_v;
+    return node;
+}
+
+// The integrand, above the cosine's horizon.
+float curve_form(CurveNode node)
+{
+    return node.moment.z / max(dot(node.r, node.r), 1e-30);
+}
+
+// The pole of a curve that goes straight on from a node, relative to it: a line whose nearest
+// point is a away passes at b.
+vec2 nearest_pole(CurveNode node)
+{
+    return vec2(-dot(node.r, node.r_way), length(node.moment)) /
+           max(dot(node.r_way, node.r_way), 1e-30);
 }
 
 const float NODE_1 = 0.339981043585;
@@ -119,24 +144,15 @@ const float NODE_2 = 0.861136311594;
 const float WEIGHT_1 = 0.652145154863;
 const float WEIGHT_2 = 0.347854845137;
 
-// rho + 1/rho of the ellipse with foci -1 and 1 outside which all poles must be. Four nodes
-// then err by rho^-8 = 2e-5 of what the pole contributes.
-const float FAR_POLE = 4.25;
-
 // Panels are 2^-16 of a curve at least: float32 knows no more of a place on it.
 const int MOST_HALVINGS = 16;
 
-// The pole of a curve that goes straight on from t, relative to t: a line whose nearest point is
-// a away passes at b.
-vec2 nearest_pole(CosineLight light, PowerCurve curve, float t)
+// Whether a panel's pole, in half widths from its middle, is outside the ellipse with foci
+// -1 and 1 and rho + 1/rho = 3.6: four nodes then err by rho^-8 = 1e-4 of what the pole
+// contributes, which is little wherever it is near.
+bool is_far(vec2 pole)
 {
-    vec2 p = curve_point(curve, t);
-    vec2 way = curve_way(curve, t);
-    vec3 r = light.center + p.x * light.u + p.y * light.v;
-    vec3 r_way = way.x * light.u + way.y * light.v;
-    vec3 w = way.x * light.center_cross_u + way.y * light.center_cross_v +
-             (p.x * way.y - p.y * way.x) * light.u_cross_v;
-    return vec2(-dot(r, r_way), length(w)) / max(dot(r_way, r_way), 1e-30);
+    return length(pole - vec2(1.0, 0.0)) + length(pole + vec2(1.0, 0.0)) > 3.6;
 }
 
 // Integral over a part of the curve that is above the cosine's horizon.
@@ -149,18 +165,20 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
     // Panels in order: after the second half of one comes the one it is half of.
     while (panel < 1 || halvings > 0) {
         float middle = from + half_width * float(2 * panel + 1);
-        vec2 pole = nearest_pole(light, curve, middle) / half_width;
-        float size = length(pole - vec2(1.0, 0.0)) + length(pole + vec2(1.0, 0.0));
-        if (size < FAR_POLE && halvings < MOST_HALVINGS) {
+        CurveNode first = curve_node(light, curve, middle - NODE_2 * half_width);
+        CurveNode last = curve_node(light, curve, middle + NODE_2 * half_width);
+        vec2 from_first = nearest_pole(first) / half_width - vec2(NODE_2, 0.0);
+        vec2 from_last = nearest_pole(last) / half_width + vec2(NODE_2, 0.0);
+        if (halvings < MOST_HALVINGS && !(is_far(from_first) && is_far(from_last))) {
             half_width *= 0.5;
             ++halvings;
             panel *= 2;
             continue;
         }
-        vec4 t = middle + half_width * vec4(-NODE_2, -NODE_1, NODE_1, NODE_2);
-        sum += half_width *
-               (WEIGHT_1 * (curve_form(light, curve, t.y) + curve_form(light, curve, t.z)) +
-                WEIGHT_2 * (curve_form(light, curve, t.x) + curve_form(light, curve, t.w)));
+        CurveNode second = curve_node(light, curve, middle - NODE_1 * half_width);
+        CurveNode third = curve_node(light, curve, middle + NODE_1 * half_width);
+        sum += half_width * (WEIGHT_2 * (curve_form(first) + curve_form(last)) +
+                             WEIGHT_1 * (curve_form(second) + curve_form(third)));
         ++panel;
         while ((panel & 1) == 0 && halvings > 0) {
             panel >>= 1;

@@ -63,6 +63,8 @@ GPU_ONLY = {
     "pinned_vector": STAGE,
     "light_edge": STAGE,
     "ggx_light_specular": STAGE,
+    "ggx_integral_bound": STAGE,
+    "ggx_contour_edge": STAGE,
     "ggx_terms": STAGE,
 }
 
@@ -72,6 +74,7 @@ FEATURES = {
     "HAS_ONE_SIDED": 1,
     "HAS_TWO_SIDED": 1,
     "HAS_CURVES": 0,
+    "CURVE_RULE": 0,
     "HAS_EXACT_FMA": 0,
     "PROBES": 1,
     "GGX_NODES": 2,

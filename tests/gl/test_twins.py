@@ -11,9 +11,11 @@ import re
 import numpy as np
 import pytest
 
+from app.curves import signed_areas
 from app.render.pack import LIGHT_HEADER
 from app.render.tables import isotropic_textures
 from ltc import table, transform
+from ltc.bezier import sign_changes
 from ltc.polygon import clipped_form_factor
 from ltc.resources import resource_path
 from tests.gl.evaluate import evaluate
@@ -23,7 +25,8 @@ FEATURES = {
     "HAS_DIFFUSE": 1,
     "HAS_ONE_SIDED": 1,
     "HAS_TWO_SIDED": 1,
-    "HAS_CURVES": 0,
+    "HAS_CURVES": 1,
+    "CURVE_RULE": 0,
     "HAS_EXACT_FMA": 0,
     "PROBES": 1,
 }
@@ -45,9 +48,34 @@ TWINS = {
     "planar_edge",
     "edge_angle",
     "cosine_light",
+    "next_crossing",
+    "sliver_area",
 }
 THROUGH_PROBE = "a stage of the integral, tested whole by test_probe.py"
+THROUGH_CURVES = "a stage of the integral along curves, tested whole by test_curves.py"
 GPU_ONLY = {
+    "power_curve": THROUGH_CURVES,
+    "curve_point": THROUGH_CURVES,
+    "curve_way": THROUGH_CURVES,
+    "bernstein": THROUGH_CURVES,
+    "curve_node": THROUGH_CURVES,
+    "curve_form": THROUGH_CURVES,
+    "is_far": THROUGH_CURVES,
+    "nearest_pole": THROUGH_CURVES,
+    "curve_integral": THROUGH_CURVES,
+    "add_pinned_curve": THROUGH_CURVES,
+    "azimuth_between": THROUGH_CURVES,
+    "add_curve": THROUGH_CURVES,
+    "lobe_density": THROUGH_CURVES,
+    "sliver_integral": THROUGH_CURVES,
+    "contour_node": THROUGH_CURVES,
+    "node_chord": THROUGH_CURVES,
+    "contour_part": THROUGH_CURVES,
+    "piece_chord": THROUGH_CURVES,
+    "closing_edge": THROUGH_PROBE,
+    "meet_horizon": THROUGH_PROBE,
+    "height_of": THROUGH_PROBE,
+    "clip_edge": THROUGH_PROBE,
     "pinned_weight": THROUGH_PROBE,
     "pinned_edge": THROUGH_PROBE,
     "add_edge": THROUGH_PROBE,
@@ -366,3 +394,38 @@ def test_view_aligned_frame(glsl):
     )
     np.testing.assert_allclose(angles[:, 0], np.sin(theta), atol=3e-7)
     np.testing.assert_allclose(angles[:, 1], np.maximum(np.cos(theta), 0.0), atol=3e-7)
+
+
+def test_next_crossing(glsl):
+    """All sign changes of cubics, one after another, ends at zero and straight lines included."""
+    rng = np.random.default_rng(21)
+    z = rng.normal(size=(COUNT, 4))
+    z[: COUNT // 8] = np.linspace(z[: COUNT // 8, 0], z[: COUNT // 8, 3], 4).T
+    z[COUNT // 8 : COUNT // 4, 0] = 0.0
+    z[COUNT // 4 : COUNT // 3, 3] *= 1e-8
+    z = f32(z)
+    body = """
+        bool above = z.x > 0.0;
+        float one = next_crossing(z, 0.0, 1.0, above);
+        float two = one < 1.0 ? next_crossing(z, one, 1.0, !above) : 1.0;
+        float three = two < 1.0 ? next_crossing(z, two, 1.0, above) : 1.0;
+        result = vec4(one, two, three, 0.0);
+    """
+    got = glsl("ltc/curve.glsl", body, {"z": z})[:, :3]
+    _, count = sign_changes(z)
+    assert np.array_equal((got < 1.0).sum(axis=1), count)
+    # Where a cubic is flat its root is known no better than its values, to 1e-6.
+    s = 1.0 - got
+    value = ((z[:, :1] * s + 3 * z[:, 1:2] * got) * s + 3 * z[:, 2:3] * got**2) * s
+    value += z[:, 3:] * got**3
+    assert np.abs(value[got < 1.0]).max() <= 2e-6
+
+
+def test_sliver_area(glsl):
+    rng = np.random.default_rng(22)
+    handles, d = f32(rng.normal(size=(COUNT, 4))), f32(rng.normal(size=(COUNT, 2)))
+    zero = np.zeros_like(d)
+    curves = np.stack([zero, handles[:, :2], d + handles[:, 2:], d], axis=1)
+    got = glsl("ltc/contour.glsl", "result.x = sliver_area(handles, d);",
+               {"handles": handles, "d": d})[:, 0]  # fmt: skip
+    np.testing.assert_allclose(got, signed_areas(curves), atol=3e-6)
