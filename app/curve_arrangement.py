@@ -469,7 +469,7 @@ def _may_meet(a: FloatArray, b: FloatArray, known: FloatArray, touch: float) -> 
     """Tell which parts may come within ``touch`` of each other but near known points."""
     low = np.maximum(np.minimum(a[:, 0], a[:, 3]), np.minimum(b[:, 0], b[:, 3]))
     high = np.minimum(np.maximum(a[:, 0], a[:, 3]), np.maximum(b[:, 0], b[:, 3]))
-    may = np.all(low <= high + touch, axis=1)
+    may: BoolArray = np.all(low <= high + touch, axis=1)
     # All of the overlap is at a known point.
     reach = np.maximum(
         np.max(np.abs(low[:, None] - known), axis=2), np.max(np.abs(high[:, None] - known), axis=2)
@@ -550,12 +550,14 @@ def _add_touches(
     cuts: dict[int, list[tuple[float, FloatArray]]] = {
         index: [(0.0, p[index, 0]), (1.0, p[index, 3])] for index in involved.tolist()
     }
-    for piece, t, point in zip(found.piece, found.t, found.point, strict=True):
-        for row in np.flatnonzero(np.isin(piece, involved)).tolist():
-            cuts[int(piece[row])].append((float(t[row]), point[row]))
+    for pieces, places, points in zip(found.piece, found.t, found.point, strict=True):
+        for row in np.flatnonzero(np.isin(pieces, involved)).tolist():
+            cuts[int(pieces[row])].append((float(places[row]), points[row]))
 
     def share(host: int, point: FloatArray) -> bool:
         """Cut a piece at a point of another one, if it is on both."""
+        if any(np.array_equal(point, known) for _, known in cuts[host]):
+            return True
         place = _parameter_along(p[host][None], point[None])
         if np.hypot(*(curves.evaluate(p[host], place[0]) - point)) > 4.0 * touch:
             return False
@@ -572,24 +574,31 @@ def _add_touches(
             range_a[row, 1] = max(range_a[row, 1], range_a[row - 1, 1])
     firsts = np.flatnonzero(begins)
     lasts = np.append(firsts[1:], len(pair)) - 1
-    for first, last in zip(firsts.tolist(), lasts.tolist(), strict=True):
-        a, b = int(one[pair[first]]), int(two[pair[first]])
-        s0, s1 = float(range_a[first, 0]), float(range_a[last, 1])
-        t0 = float(range_b[first : last + 1, 0].min())
-        t1 = float(range_b[first : last + 1, 1].max())
-        shared = False
-        for here, other, low, high in ((a, b, s0, s1), (b, a, t0, t1)):
-            length = high - low
-            for t, point in list(cuts[here]):
-                if low - length <= t <= high + length:
-                    shared |= share(other, point)
-        ends = curves.evaluate(p[a], np.array([s0, s1]))
-        is_long = float(np.max(np.abs(ends[1] - ends[0]))) > LONG_TOUCH
-        for s in (s0, s1) if is_long else () if shared else (0.5 * (s0 + s1),):
-            point = curves.evaluate(p[a], s)
-            if share(b, point):
-                found.add(np.array([a]), np.array([s]), point[None])
-                cuts[a].append((s, point))
+    # The second time round for what a later stretch gave to a piece of an earlier one.
+    for is_first_round in (True, False):
+        for first, last in zip(firsts.tolist(), lasts.tolist(), strict=True):
+            a, b = int(one[pair[first]]), int(two[pair[first]])
+            begin, end = float(range_a[first, 0]), float(range_a[last, 1])
+            others = range_b[first : last + 1]
+            shared = False
+            for here, other, low, high in (
+                (a, b, begin, end),
+                (b, a, float(others.min()), float(others.max())),
+            ):
+                length = high - low
+                for t, point in list(cuts[here]):
+                    if low - length <= t <= high + length:
+                        shared |= share(other, point)
+            if not is_first_round:
+                continue
+            tips = curves.evaluate(p[a], np.array([begin, end]))
+            is_long = float(np.max(np.abs(tips[1] - tips[0]))) > LONG_TOUCH
+            middle = () if shared else (0.5 * (begin + end),)
+            for at in (begin, end) if is_long else middle:
+                new = curves.evaluate(p[a], at)
+                if share(b, new):
+                    found.add(np.array([a]), np.array([at]), new[None])
+                    cuts[a].append((at, new))
 
 
 # Edges between vertices
@@ -963,7 +972,7 @@ def _as_drawn(
     last = np.roll(breaks, -1) - 1
     source, t0, t1 = source[breaks], t0[breaks], t1[last]
     vertex = start[breaks]
-    loop = every[source].copy()
+    loop: FloatArray = every[source].copy()
     whole = (t0 == 0.0) & (t1 == 1.0)
     turned = (t0 == 1.0) & (t1 == 0.0)
     loop[turned] = loop[turned][:, ::-1]
