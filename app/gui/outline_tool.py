@@ -90,6 +90,8 @@ class OutlineTool:
                 self._begin(editor, light, grip)
             if grip.what != "edge":
                 self._grip_menu(editor, grip)
+            elif imgui.is_item_hovered() and imgui.is_mouse_released(imgui.MouseButton_.right):
+                self.ask_about(Spot(grip.contour, grip.index, 0.5))
         self._follow(editor, sight)
 
     def draw(self, editor: Editor, sight: Sight, hidden: frozenset[tuple[int, int]]) -> None:

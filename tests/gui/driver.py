@@ -37,6 +37,7 @@ from app.scene import (
     Transform,
 )
 from app.scene_io import load_scene
+from tests.gui import outlines
 from tests.gui.application import Application
 
 CTRL, SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
@@ -553,6 +554,7 @@ SCENARIOS = (
     unsaved_edits_are_asked_about,
     names_and_visibility,
     menus_open,
+    *outlines.SCENARIOS,
 )
 
 

@@ -42,6 +42,14 @@ SCENARIOS = (
     "unsaved_edits_are_asked_about",
     "names_and_visibility",
     "menus_open",
+    "drag_an_anchor",
+    "drag_handles_of_each_kind",
+    "insert_and_remove_on_a_curve",
+    "lines_kinds_and_splits_by_menu",
+    "convert_and_mix",
+    "presets_from_the_menu",
+    "type_a_text",
+    "drop_a_drawing_and_a_font",
 )
 
 pytestmark = pytest.mark.skipif(
