@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import curves
-from app.curve_arrangement import curve_boundary, winding_number
+from app.curve_arrangement import curve_boundary
+from app.monotone_pieces import winding_number
 from app.polygon_arrangement import (
     Region,
     cross,

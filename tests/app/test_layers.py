@@ -16,6 +16,7 @@ GL = {"moderngl", "moderngl_window", "glcontext", "OpenGL"}
 GUI = {"imgui_bundle", "glfw", "implot", "imguizmo"}
 PURE = {
     "app.scene", "app.scene_io", "app.meshes", "app.outline", "app.curves", "app.curve_arrangement",
+    "app.curve_meetings", "app.monotone_pieces",
     "app.polygon_arrangement", "app.presets", "app.errors", "app.files",
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
     "app.lights", "app.planes", "app.contours", "app.sources", "app.step_names", "app.gui.messages",

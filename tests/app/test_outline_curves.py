@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app import curve_arrangement, curves
+from app.monotone_pieces import winding_number
 from app.outline import area, boundary, contains, resolve, signed_area, triangulate
 from app.polygon_arrangement import polygon_regions
 from app.presets import disk, ellipse, heart, ring, rounded_rectangle
@@ -90,9 +91,9 @@ def assert_is_boundary(shape: Outline, chains: list[Chain]) -> None:
     low, high = curves.bounds(every)
     places = np.random.default_rng(len(every)).uniform(low.min(axis=0), high.max(axis=0), (30, 2))
     for place in places:
-        before = curve_arrangement.winding_number(every, place)
+        before = winding_number(every, place)
         inside = before % 2 != 0 if shape.fill_rule == "evenodd" else before != 0
-        assert curve_arrangement.winding_number(result, place) == int(inside)
+        assert winding_number(result, place) == int(inside)
         assert contains(shape, (float(place[0]), float(place[1]))) == inside
 
 
