@@ -48,12 +48,15 @@ DIVISIONS = 4
 DIFFUSE_EPSILON = 1000.0
 """The paper's threshold for diffuse light: no interval is halved more than once."""
 
-MAX_LEVEL = 16
-"""Halvings of one of the first intervals: 4 times 65,536 edges a curve, the paper's worst case
+MAX_LEVEL = 10
+"""Halvings of one of the first intervals: 4 times 2,048 edges a curve, the paper's worst case
 being a point on the outline itself, where no triangle ever becomes small."""
 
 STRAIGHT = 1e-12
 """Distance of a straight curve's handles from its chord, over its length: rounding."""
+
+CHUNK = 2**16
+"""Corners of polygons at a time: more would not fit the caches."""
 
 NEAREST = 2e-16
 """Parameter between a curve's end and a crossing of it, at least: rounding."""
@@ -197,16 +200,17 @@ def uniform(
     for chain in chains:
         # Only whole rows can be one array: a curve that is straight for one row only is cut.
         straight = np.all(is_straight(chain), axis=0)
-        corners = np.concatenate(
-            [
-                chain[:, j, :1] if straight[j] else _evaluate(chain[:, j, None], t)
-                for j in range(chain.shape[1])
-            ],
-            axis=1,
-        )
-        evaluations += corners.shape[1]
-        if corners.shape[1] > 2:
-            value += polygon.ltc_polygon_form_factor(matrix, [corners])
+        corners = int(np.sum(np.where(straight, 1, edges)))
+        evaluations += corners
+        rows = max(1, CHUNK // corners)
+        for start in range(0, len(chain) if corners > 2 else 0, rows):
+            part = slice(start, start + rows)
+            loop = [
+                curve[:, :1] if line else _evaluate(curve[:, None], t)
+                for curve, line in zip(np.moveaxis(chain[part], 1, 0), straight, strict=True)
+            ]
+            polygons = np.concatenate(loop, axis=1)
+            value[part] += polygon.ltc_polygon_form_factor(matrix[part], [polygons])
     return Counted(value.reshape(shape), evaluations.reshape(shape))
 
 

@@ -23,7 +23,7 @@ from rich.progress import (
 
 from app.errors import InputError, nearest
 from app.meshes import load_mesh
-from app.render.techniques import AUTOMATIC, AUTOMATIC_DESCRIPTION, TECHNIQUES
+from app.render.techniques import technique_lines
 from app.scene import MAX_IMAGE_SIDE, MAX_SAMPLES, Scene
 from app.scene_io import demo_scenes, load_scene
 
@@ -74,10 +74,8 @@ def whole_number(option: str, least: int, most: int) -> Callable[[str | int], in
 def _list_techniques(value: list[str] | str | None) -> list[str] | str | None:
     names = [value] if isinstance(value, str) else value or []
     if "help" in names:
-        width = max(len(name) for name in (AUTOMATIC, *TECHNIQUES))
-        typer.echo(f"{AUTOMATIC:{width}}  {AUTOMATIC_DESCRIPTION}")
-        for name, technique in TECHNIQUES.items():
-            typer.echo(f"{name:{width}}  {technique.description}")
+        for line in technique_lines():
+            typer.echo(line)
         raise typer.Exit
     return value
 
@@ -101,7 +99,7 @@ TechniqueOption = Annotated[
     str,
     typer.Option(
         "--technique",
-        metavar="NAME",
+        metavar="NAME[:N]",
         help="How to shade; 'help' lists the techniques.",
         callback=_list_techniques,
         is_eager=True,
@@ -111,7 +109,7 @@ TechniquesOption = Annotated[
     list[str],
     typer.Option(
         "--technique",
-        metavar="NAME",
+        metavar="NAME[:N]",
         help="How to shade; repeat for several, 'help' lists them.",
         callback=_list_techniques,
         is_eager=True,

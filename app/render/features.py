@@ -26,7 +26,7 @@ from app.render.pack import (
     light_geometry,
     node_count,
 )
-from app.render.techniques import DEFAULT_TECHNIQUE, find_technique
+from app.render.techniques import DEFAULT_TECHNIQUE, find_technique, parse_technique
 from app.scene import AreaLight, Scene
 
 STORAGE_TEXTURE_WIDTH = 1024
@@ -67,7 +67,8 @@ def _rounded(count: int) -> int:
 class LightNeeds:
     """The lights of a scene that reach surfaces.
 
-    ``parts`` counts edges, or where a light has curves the nodes of all trees;
+    ``parts`` counts edges, or where a light has curves the nodes of all trees, or
+    curves themselves where the technique takes them ``whole``;
     ``uniform_texels`` is the uniform block's array length, 0 where the lights
     need a texture (or there are none).
     """
@@ -75,6 +76,7 @@ class LightNeeds:
     count: int
     parts: int
     curved: bool
+    whole: bool
     texels: int
     one_sided: bool
     two_sided: bool
@@ -82,7 +84,9 @@ class LightNeeds:
     exact_fma: bool
 
     @classmethod
-    def of(cls, lights: Sequence[AreaLight], limits: Limits) -> LightNeeds:
+    def of(
+        cls, lights: Sequence[AreaLight], limits: Limits, technique: str = DEFAULT_TECHNIQUE
+    ) -> LightNeeds:
         """Raise `InputError` if the lights are more, or larger, than the machine can hold."""
         geometries = [light_geometry(light) for light in lights]
         shining = [
@@ -91,7 +95,10 @@ class LightNeeds:
             if any(light.radiance) and geometry.parts
         ]
         curved = has_curves(lights)
-        parts = sum(node_count(item) if curved else light_geometry(item).parts for item in shining)
+        whole = curved and find_technique(technique).curve_rule > 0
+        parts = sum(
+            node_count(item, whole) if curved else light_geometry(item).parts for item in shining
+        )
         size = TEXELS_PER_NODE if curved else TEXELS_PER_EDGE
         texels = TEXELS_PER_LIGHT * len(lights) + size * parts
         if texels > limits.storage_texels:
@@ -104,6 +111,7 @@ class LightNeeds:
             len(lights),
             parts,
             curved,
+            whole,
             texels,
             any(not light.two_sided for light in shining),
             any(light.two_sided for light in shining),
@@ -114,7 +122,13 @@ class LightNeeds:
     @property
     def part_name(self) -> str:
         """What ``parts`` counts."""
-        return "node" if self.curved else "edge"
+        return "curve" if self.whole else "node" if self.curved else "edge"
+
+    def technique(self, wanted: str) -> str:
+        """Return whose shaders integrate these lights: without curves the published are ``ltc``."""
+        if find_technique(wanted).curve_rule and not self.curved:
+            return DEFAULT_TECHNIQUE
+        return wanted
 
     def defines(self) -> dict[str, int]:
         """Return the numbers that shaders which read lights are assembled with."""
@@ -146,8 +160,8 @@ class LightingFeatures:
         Array length of the material block, 0 where materials need a texture
         (or nothing is shaded).
     technique : str
-        Whose shaders are included; the default one's where nothing is glossy,
-        because diffuse reflection is the same in all.
+        Whose shaders are included; the default one's where nothing is glossy, because
+        diffuse reflection is the same in all but those that take curves whole.
     tangents : bool
         Some glossy material is anisotropic, and the technique shades it so.
     """
@@ -166,7 +180,7 @@ class LightingFeatures:
         cls, scene: Scene, samples: int, limits: Limits, technique: str = DEFAULT_TECHNIQUE
     ) -> LightingFeatures:
         """Raise `InputError` if lights or objects are more than the machine can hold."""
-        lights = LightNeeds.of(scene.lights, limits)
+        lights = LightNeeds.of(scene.lights, limits, technique)
         shines = lights.one_sided or lights.two_sided
         used = scene.object_materials()
         if TEXELS_PER_MATERIAL * len(used) > limits.storage_texels:
@@ -185,7 +199,7 @@ class LightingFeatures:
             samples > 1,
             lights,
             rounded if fits else 0,
-            technique if specular else DEFAULT_TECHNIQUE,
+            lights.technique(technique) if specular or lights.whole else DEFAULT_TECHNIQUE,
             specular
             and find_technique(technique).anisotropic
             and any(material.is_anisotropic and any(material.f0) for material in used),
@@ -227,9 +241,14 @@ class LightingFeatures:
 
 def technique_defines(technique: str) -> dict[str, int]:
     """Return the numbers that choose a technique's shaders."""
-    if technique == "ggx":
-        return {"TECHNIQUE_GGX": 1, "GGX_NODES": 2}
-    return {"TECHNIQUE_GGX": 0}
+    choice = parse_technique(technique)
+    defines = {
+        "TECHNIQUE_GGX": int(choice.name == "ggx"),
+        "CURVE_RULE": choice.technique.curve_rule,
+    }
+    if choice.number is not None:
+        defines["GGX_NODES" if choice.name == "ggx" else "UNIFORM_EDGES"] = choice.number
+    return defines
 
 
 def probe_defines(lights: LightNeeds, technique: str) -> dict[str, int]:
@@ -238,6 +257,6 @@ def probe_defines(lights: LightNeeds, technique: str) -> dict[str, int]:
         "HAS_SPECULAR": 1,
         "HAS_DIFFUSE": 1,
         "PROBES": 1,
-        **technique_defines(technique),
+        **technique_defines(lights.technique(technique)),
         **lights.defines(),
     }

@@ -166,7 +166,7 @@ class Renderer:
         self._timers = PassTimers(ctx)
         self._cpu_ms = 0.0
         self._held: Scene | None = None
-        self._held_lights: tuple[object, int] | None = None
+        self._held_lights: tuple[object, tuple[bool, int]] | None = None
         self._held_materials: tuple[object, object, int] | None = None
         self._needs: Needs | None = None
         self._seen: _Seen | None = None
@@ -356,7 +356,7 @@ class Renderer:
                 raise ValueError(f"{name} has {len(array)} rows, expected {count} as in position")
         alphas = arrays["alpha"]
         technique = suited_technique(settings.technique, bool(np.any(alphas[:, 0] != alphas[:, 1])))
-        needs = LightNeeds.of(scene.lights, self.limits)
+        needs = LightNeeds.of(scene.lights, self.limits, technique)
         if not (needs.one_sided or needs.two_sided) or not count:
             zero = np.zeros((count, 3), dtype=np.float32)
             return {"specular": zero, "diffuse": zero.copy()}
@@ -565,9 +565,10 @@ class Renderer:
 
     def _hold_lights(self, scene: Scene, needs: LightNeeds) -> None:
         held = self._held_lights
-        if held is None or held[0] is not scene.lights or held[1] != needs.uniform_texels:
+        layout = (needs.whole, needs.uniform_texels)
+        if held is None or held[0] is not scene.lights or held[1] != layout:
             self._lighting.set_lights(scene.lights, needs)
-            self._held_lights = (scene.lights, needs.uniform_texels)
+            self._held_lights = (scene.lights, layout)
 
     def _hold_materials(self, scene: Scene, uniform_texels: int) -> None:
         held = self._held_materials

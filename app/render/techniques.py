@@ -1,5 +1,9 @@
 """The techniques that shade, by the names that users type.
 
+A name may be followed by a number, ``uniform:30``: what it means and from where to where it
+goes is the technique's own. Within the renderer a technique is its canonical text, without the
+number where that is the default (`suited_technique`), so that equal texts are equal programs.
+
 To add one: a line here, its entry function in ``shaders/``, and a feature in
 `app.render.features` that selects it.
 """
@@ -7,9 +11,20 @@ To add one: a line here, its entry function in ``shaders/``, and a feature in
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from app.errors import InputError, expected_one_of
+from app.errors import InputError, expected_one_of, quote
 from app.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """The number that may follow a technique's name: a whole one from ``least`` to ``most``."""
+
+    meaning: str
+    least: int
+    most: int
+    default: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +39,18 @@ class Technique:
         Whether it shades alpha_x apart from alpha_y, and so reads tangents.
     has_tables : bool
         Whether its specular part looks up the tables of `app.render.tables`.
+    curve_rule : int
+        The feature CURVE_RULE: how it integrates along curves. All but 0 are published
+        methods that take every curve whole, and are ``ltc`` where there is none.
+    parameter : Parameter, optional
+        What a number behind its name means.
     """
 
     description: str
     anisotropic: bool
     has_tables: bool
+    curve_rule: int = 0
+    parameter: Parameter | None = None
 
 
 TECHNIQUES: dict[str, Technique] = {
@@ -43,6 +65,27 @@ TECHNIQUES: dict[str, Technique] = {
         "Lambert diffuse",
         anisotropic=True,
         has_tables=False,
+        parameter=Parameter("quadrature nodes an edge", 1, 4, 2),
+    ),
+    "adaptive": Technique(
+        "ltc with curves halved until triangles between chords add little, as published by Kuge "
+        "et al. 2022",
+        anisotropic=False,
+        has_tables=True,
+        curve_rule=1,
+    ),
+    "adaptive-extrapolated": Technique(
+        "adaptive with the same chords, extrapolated to the curve",
+        anisotropic=False,
+        has_tables=True,
+        curve_rule=2,
+    ),
+    "uniform": Technique(
+        "ltc with every curve cut into the same number of edges",
+        anisotropic=False,
+        has_tables=True,
+        curve_rule=3,
+        parameter=Parameter("edges a curve", 1, 4096, 18),
     ),
 }
 """By name, in the order in which help lists them."""
@@ -56,34 +99,68 @@ DEFAULT_TECHNIQUE = "ltc"
 """Used where techniques do not differ."""
 
 
-def find_technique(name: str) -> Technique:
-    """Return a technique by its own name, not ``auto``.
+class Choice(NamedTuple):
+    """A technique by its bare name, and its number; None where it takes none."""
+
+    name: str
+    number: int | None
+
+    @property
+    def technique(self) -> Technique:
+        """What the renderer must know of it."""
+        return TECHNIQUES[self.name]
+
+    def __str__(self) -> str:
+        parameter = self.technique.parameter
+        usual = parameter is None or parameter.default == self.number
+        return self.name if usual else f"{self.name}:{self.number}"
+
+
+def parse_technique(text: str) -> Choice:
+    """Return the technique that a text such as ``ltc`` or ``uniform:30`` names, not ``auto``.
 
     Raises
     ------
     InputError
-        If there is none of this name; says which is nearest.
+        If there is none of this name, saying which is nearest, or its number is wrong.
     """
+    name, colon, number = text.partition(":")
     if name not in TECHNIQUES:
         known = (AUTOMATIC, *TECHNIQUES)
         raise InputError(f"technique '{name}' is unknown, {expected_one_of(name, known)}")
-    return TECHNIQUES[name]
+    parameter = TECHNIQUES[name].parameter
+    if not colon:
+        return Choice(name, parameter.default if parameter else None)
+    if parameter is None:
+        raise InputError(f"technique '{name}' takes no number, found {quote(text)}")
+    whole = number.isascii() and number.isdigit() and len(number) <= 9
+    if not whole or not parameter.least <= int(number) <= parameter.most:
+        raise InputError(
+            f"technique '{name}': the number of {parameter.meaning} is {quote(number)}, expected "
+            f"a whole number from {parameter.least} to {parameter.most}"
+        )
+    return Choice(name, int(number))
 
 
-def suited_technique(name: str, anisotropic: bool) -> str:
-    """Return the technique that ``name`` stands for.
+def find_technique(text: str) -> Technique:
+    """Return what the renderer must know of a technique; raises as `parse_technique`."""
+    return parse_technique(text).technique
+
+
+def suited_technique(text: str, anisotropic: bool) -> str:
+    """Return the technique that ``text`` stands for, in canonical form.
 
     Parameters
     ----------
-    name : str
-        A technique or ``auto``.
+    text : str
+        A technique, with its number if it takes one, or ``auto``.
     anisotropic : bool
         Whether something glossy is anisotropic.
 
     Raises
     ------
     InputError
-        If there is no technique of this name.
+        If there is no technique of this name, or its number is wrong.
 
     Notes
     -----
@@ -91,13 +168,26 @@ def suited_technique(name: str, anisotropic: bool) -> str:
     one sees, and ``ggx`` takes 2 to 3 times as long for a sixth of it. Anisotropic
     lobes ``ltc`` cannot shade at all.
     """
-    if name == AUTOMATIC:
+    if text == AUTOMATIC:
         return "ggx" if anisotropic else "ltc"
-    find_technique(name)
-    return name
+    return str(parse_technique(text))
 
 
-def technique_of(scene: Scene, name: str) -> str:
-    """Return the technique that ``name`` stands for in a scene; raises as `suited_technique`."""
+def technique_of(scene: Scene, text: str) -> str:
+    """Return the technique that ``text`` stands for in a scene; raises as `suited_technique`."""
     used = scene.object_materials()
-    return suited_technique(name, any(m.is_anisotropic and any(m.f0) for m in used))
+    return suited_technique(text, any(m.is_anisotropic and any(m.f0) for m in used))
+
+
+def technique_lines() -> list[str]:
+    """Return the lines of ``--technique help``: names, numbers they take, and what they do."""
+    rows = [(AUTOMATIC, AUTOMATIC_DESCRIPTION)]
+    for name, technique in TECHNIQUES.items():
+        parameter = technique.parameter
+        if parameter is None:
+            rows.append((name, technique.description))
+            continue
+        span = f"{parameter.least} to {parameter.most}, {parameter.default} by default"
+        rows.append((f"{name}[:N]", f"{technique.description}; N {parameter.meaning}, {span}"))
+    width = max(len(name) for name, _ in rows)
+    return [f"{name:{width}}  {description}" for name, description in rows]

@@ -1,0 +1,96 @@
+"""What the technique ``ltc`` converges to, in float64: the measure of all that approximate it.
+
+The same table, looked up as the shaders do, and the same lights, but their curves integrated
+to rounding (`ltc.bezier`). The difference to a picture is then what a way
+of integrating costs, and nothing else: not what the fitted lobe itself errs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.outline import boundary
+from app.render.tables import isotropic_textures
+from app.scene import AreaLight
+from ltc import bezier, transform
+from ltc.table import sample_textures
+
+FloatArray = NDArray[np.float64]
+
+BATCH = 512
+"""Points at once: thousands of them with hundreds of curves would fill the memory."""
+
+
+def shading_frames(normal: FloatArray, view: FloatArray) -> FloatArray:
+    """Return shading_from_world, (n, 3, 3), of unit normals and directions to the viewer."""
+    x = view - normal * np.sum(normal * view, axis=-1, keepdims=True)
+    # Any tangent will do where the view is the normal.
+    axis = np.where(np.abs(normal[:, :1]) < 0.5, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    degenerate = np.sum(x * x, axis=-1) < 1e-14
+    x = np.where(degenerate[:, None], np.cross(normal, axis), x)
+    x /= np.sqrt(np.sum(x * x, axis=-1, keepdims=True))
+    return np.stack([x, np.cross(normal, x), normal], axis=-2)
+
+
+def shading_contours(
+    light: AreaLight, position: FloatArray, frames: FloatArray
+) -> list[FloatArray]:
+    """Return a light's contours, (n, k, 4, 3) each, in the frames of points.
+
+    Those that see its face count them positive, those behind it negative.
+    """
+    origin, u, v = (np.array(a) for a in (light.plane.origin, light.plane.u, light.plane.v))
+    contours = []
+    for loop in boundary(light.outline):
+        world = bezier.positive_winding(origin + loop[..., :1] * u + loop[..., 1:] * v)
+        local = np.einsum("nij,nkcj->nkci", frames, world - position[:, None, None])
+        contours.append(local)
+    return contours
+
+
+def exact_radiance(
+    lights: Sequence[AreaLight],
+    position: ArrayLike,
+    normal: ArrayLike,
+    view: ArrayLike,
+    alpha: ArrayLike,
+) -> tuple[FloatArray, FloatArray]:
+    """Return what points of a white material send to their viewers.
+
+    Parameters
+    ----------
+    position, normal, view : (n, 3) float
+        World space, as for `app.render.renderer.Renderer.probe`; views above the surface.
+    alpha : (n,) float
+        GGX parameters.
+
+    Returns
+    -------
+    specular, diffuse : (n, 3) float64
+        Radiance for F = 1 and albedo 1, summed over the lights.
+    """
+    p, n, wo = (np.asarray(a, dtype=np.float64) for a in (position, normal, view))
+    a = np.asarray(alpha, dtype=np.float64)
+    specular, diffuse = np.zeros((2, len(p), 3))
+    for start in range(0, len(p), BATCH):
+        part = slice(start, start + BATCH)
+        frames = shading_frames(n[part], wo[part])
+        cosine = np.clip(np.sum(n[part] * wo[part], axis=-1), 0.0, 1.0)
+        matrix, albedo, _ = sample_textures(isotropic_textures(), a[part], cosine)
+        inverse = transform.invert(matrix)
+        gain = albedo / (1.0 - transform.leak(matrix))
+        for light in lights:
+            if not any(light.radiance):
+                continue
+            contours = shading_contours(light, p[part], frames)
+            away = np.cross(light.plane.u, light.plane.v)
+            front = (p[part] - np.array(light.plane.origin)) @ away > 0.0
+            sign = np.where(front, 1.0, -1.0) * (front | light.two_sided)
+            lobe = gain * bezier.ltc_form_factor(inverse, contours).value
+            lambert = bezier.form_factor(contours).value
+            specular[part] += np.maximum(sign * lobe, 0.0)[:, None] * light.radiance
+            diffuse[part] += np.maximum(sign * lambert, 0.0)[:, None] * light.radiance
+    return specular, diffuse
