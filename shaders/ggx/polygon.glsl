@@ -141,12 +141,6 @@ vec3 direction_difference(GgxLight light, vec3 dp, float distance)
            max(distance, 1e-30);
 }
 
-vec3 edge_normal(CosineLight light, PlanarEdge edge)
-{
-    return edge.d.x * light.center_cross_u + edge.d.y * light.center_cross_v +
-           edge.moment * light.u_cross_v;
-}
-
 // Whether the outline spans so little of the lobe that one point of it stands for all.
 bool is_pinned(PlanarLight light, GgxLight about, GgxView view)
 {
@@ -167,7 +161,7 @@ void add_pinned_edge(GgxLight light, PlanarEdge edge, GgxView view, inout Pinned
 {
     vec3 u = light.placed.u;
     vec3 v = light.placed.v;
-    vec3 w = edge_normal(light.placed, edge);
+    vec3 w = edge_plane(light.placed, edge);
     vec3 d = edge.d.x * u + edge.d.y * v;
     float c2 = light.distance * light.distance;
     vec3 hc = light.half_vector;
@@ -205,7 +199,7 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
 {
     vec3 u = light.placed.u;
     vec3 v = light.placed.v;
-    vec3 w = edge_normal(light.placed, edge);
+    vec3 w = edge_plane(light.placed, edge);
     float w2 = dot(w, w);
     if (w2 < 1e-36) {
         return false;

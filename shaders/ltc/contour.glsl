@@ -349,7 +349,8 @@ PlanarEdge piece_chord(PlanarEdge whole, PowerCurve curve, int piece, float scal
 float light_form_factor(
     PlanarLight light, CosineTransform transform, PlaneView view, vec3 normal)
 {
-    CosineLight transformed = cosine_light(transform, light, view);
+    // Never pinned: of a light so small the tree's root is chord enough.
+    CosineLight transformed = near_light(transform, light, view);
     LobeDensity density = lobe_density(transformed);
     Contour contour = contour_start(light, view, transformed, normal);
     ContourSum sum = ContourSum(0.0, 0.0, 0.0);
@@ -363,7 +364,7 @@ float light_form_factor(
                 add_curve(transformed, part.curve, part.from, part.to, sum);
 #endif
             } else {
-                add_edge(transformed, part.edge, sum);
+                add_near_edge(transformed, part.edge, sum);
                 sum.angle += 6.28318530718 * part.sliver;
             }
         }

@@ -6,9 +6,7 @@
 // that the pole as seen from a place near it, as if the curve went straight on, is near the
 // true one. A panel that sees a pole nearby from its outer nodes is halved, else its four
 // nodes integrate it. docs/curves.md has the figures, and those of what was tried and left.
-// Parts below the cosine's horizon are replaced by their azimuth, as with edges. (The
-// nadir, opposite to the lobe's axis, is below the surface, so it cannot lie between a part
-// above the surface and its chord: the chord's azimuth is the curve's.)
+// Parts below the cosine's horizon are replaced by their azimuth, as with edges, node by node.
 
 #include "ltc/polygon.glsl"
 
@@ -106,7 +104,7 @@ float next_crossing(vec4 z, float from, float to, bool above)
     return min(t, 0.9999999 * to);
 }
 
-// A place on a curve as the integral sees it.
+// A place on a curve as the integral sees it: its azimuth where it is below the horizon.
 struct CurveNode {
     vec3 r;         // in the cosine's frame
     vec3 r_way;     // dr/dt
@@ -122,10 +120,15 @@ CurveNode curve_node(CosineLight light, PowerCurve curve, float t)
     node.r_way = way.x * light.u + way.y * light.v;
     node.moment = way.x * light.center_cross_u + way.y * light.center_cross_v +
                   (p.x * way.y - p.y * way.x) * light.u_cross_v;
+    if (node.r.z < 0.0) {
+        node.r.z = 0.0;
+        node.r_way.z = 0.0;
+        node.moment.xy = vec2(0.0);
+    }
     return node;
 }
 
-// The integrand, above the cosine's horizon.
+// The integrand.
 float curve_form(CurveNode node)
 {
     return node.moment.z / max(dot(node.r, node.r), 1e-30);
@@ -147,15 +150,20 @@ const float WEIGHT_2 = 0.347854845137;
 // Panels are 2^-16 of a curve at least: float32 knows no more of a place on it.
 const int MOST_HALVINGS = 16;
 
-// Whether a panel's pole, in half widths from its middle, is outside the ellipse with foci
-// -1 and 1 and rho + 1/rho = 3.6: four nodes then err by rho^-8 = 1e-4 of what the pole
-// contributes, which is little wherever it is near.
-bool is_far(vec2 pole)
+// Limits of rho + 1/rho for the ellipse with foci at a panel's ends that keeps its pole outside.
+// At 3.6 four nodes err by rho^-8 = 1e-4 of what the pole contributes, which is little wherever
+// it is near. Across the cosine's horizon the integrand has a kink in its second derivative,
+// and panels must be half as wide for the same error.
+const float FAR_POLE = 3.6;
+const float FAR_FROM_KINK = 7.0;
+
+// The pole in half widths from the panel's middle.
+float pole_ellipse(vec2 pole)
 {
-    return length(pole - vec2(1.0, 0.0)) + length(pole + vec2(1.0, 0.0)) > 3.6;
+    return length(pole - vec2(1.0, 0.0)) + length(pole + vec2(1.0, 0.0));
 }
 
-// Integral over a part of the curve that is above the cosine's horizon.
+// Integral over a part of the curve.
 float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
 {
     float half_width = 0.5 * (to - from);
@@ -169,7 +177,9 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
         CurveNode last = curve_node(light, curve, middle + NODE_2 * half_width);
         vec2 from_first = nearest_pole(first) / half_width - vec2(NODE_2, 0.0);
         vec2 from_last = nearest_pole(last) / half_width + vec2(NODE_2, 0.0);
-        if (halvings < MOST_HALVINGS && !(is_far(from_first) && is_far(from_last))) {
+        float ellipse = min(pole_ellipse(from_first), pole_ellipse(from_last));
+        bool has_kink = (first.r.z > 0.0) != (last.r.z > 0.0);
+        if (ellipse < (has_kink ? FAR_FROM_KINK : FAR_POLE) && halvings < MOST_HALVINGS) {
             half_width *= 0.5;
             ++halvings;
             panel *= 2;
@@ -189,66 +199,15 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
     return sum;
 }
 
-// The same where the light is pinned: differences to the pin, which are smooth.
-void add_pinned_curve(
-    CosineLight light, PowerCurve curve, float from, float to, inout ContourSum sum)
-{
-    float middle = 0.5 * (from + to);
-    float half_width = 0.5 * (to - from);
-    for (int i = 0; i < 4; ++i) {
-        float place = (i & 1) == 0 ? -half_width : half_width;
-        float t = middle + place * (i < 2 ? NODE_1 : NODE_2);
-        float weight = half_width * (i < 2 ? WEIGHT_1 : WEIGHT_2);
-        vec2 p = curve_point(curve, t);
-        vec2 way = curve_way(curve, t);
-        float moment = p.x * way.y - p.y * way.x;
-        float w_z = way.x * light.center_cross_u.z + way.y * light.center_cross_v.z +
-                    moment * light.u_cross_v.z;
-        sum.area += weight * moment;
-        sum.angle += weight * w_z * pinned_weight(light, p.x * light.u + p.y * light.v);
-    }
-}
-
-// The angle from a to b, less than half a turn.
-float azimuth_between(vec2 a, vec2 b)
-{
-    float cross_z = a.x * b.y - a.y * b.x;
-    float angle = positive_atan2(abs(cross_z), dot(a, b));
-    return cross_z < 0.0 ? -angle : angle;
-}
-
 // The part [from, to] of a curve, clipped at the surface's horizon before.
 void add_curve(
     CosineLight light, PlanarCurve planar, float from, float to, inout ContourSum sum)
 {
-    PowerCurve curve = power_curve(planar);
+    vec2 a = planar.a;
+    vec2 b = planar.a + planar.d;
     vec2 rise = vec2(light.u.z, light.v.z);
-    float start = light.center.z + dot(rise, planar.a);
-    vec4 z = start + vec4(0.0, dot(rise, planar.a_handle),
-                          dot(rise, planar.d + planar.b_handle), dot(rise, planar.d));
-    sum.top = max(sum.top, max(max(z.x, z.y), max(z.z, z.w)));
-    if (light.pin > 0.0) {
-        add_pinned_curve(light, curve, from, to, sum);
-        return;
-    }
-    bool above = bernstein(z, from) > 0.0;
-    float at = from;
-    // A cubic crosses the horizon three times at most.
-    for (int i = 0; i < 4; ++i) {
-        float next = next_crossing(z, at, to, above);
-        if (above) {
-            sum.angle += curve_integral(light, curve, at, next);
-        } else {
-            vec2 p = curve_point(curve, at);
-            vec2 q = curve_point(curve, next);
-            sum.angle += azimuth_between(
-                light.center.xy + p.x * light.u.xy + p.y * light.v.xy,
-                light.center.xy + q.x * light.u.xy + q.y * light.v.xy);
-        }
-        if (next >= to) {
-            break;
-        }
-        at = next;
-        above = !above;
-    }
+    vec4 z = vec4(dot(rise, a), dot(rise, a + planar.a_handle), dot(rise, b + planar.b_handle),
+                  dot(rise, b));
+    sum.top = max(sum.top, light.center.z + max(max(z.x, z.y), max(z.z, z.w)));
+    sum.angle += curve_integral(light, power_curve(planar), from, to);
 }

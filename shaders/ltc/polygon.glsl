@@ -226,14 +226,29 @@ float pinned_edge(CosineLight light, vec3 dp, vec3 dq, float w_z)
            (pinned_weight(light, middle - offset) + pinned_weight(light, middle + offset));
 }
 
+// The edge's plane, p x q, from the cofactors.
+vec3 edge_plane(CosineLight light, PlanarEdge edge)
+{
+    return edge.d.x * light.center_cross_u + edge.d.y * light.center_cross_v +
+           edge.moment * light.u_cross_v;
+}
+
+// An edge of a light that is not pinned.
+void add_near_edge(CosineLight light, PlanarEdge edge, inout ContourSum sum)
+{
+    vec3 p = light.center + edge.a.x * light.u + edge.a.y * light.v;
+    vec3 q = light.center + edge.b.x * light.u + edge.b.y * light.v;
+    sum.top = max(sum.top, max(p.z, q.z));
+    sum.angle += edge_angle(p, q, edge_plane(light, edge));
+}
+
 void add_edge(CosineLight light, PlanarEdge edge, inout ContourSum sum)
 {
     vec3 dp = edge.a.x * light.u + edge.a.y * light.v;
     vec3 dq = edge.b.x * light.u + edge.b.y * light.v;
     vec3 p = light.center + dp;
     vec3 q = light.center + dq;
-    vec3 w = edge.d.x * light.center_cross_u + edge.d.y * light.center_cross_v +
-             edge.moment * light.u_cross_v;
+    vec3 w = edge_plane(light, edge);
     sum.top = max(sum.top, max(p.z, q.z));
     if (light.pin > 0.0) {
         sum.area += edge.moment;
@@ -243,12 +258,25 @@ void add_edge(CosineLight light, PlanarEdge edge, inout ContourSum sum)
     }
 }
 
-CosineLight cosine_light(CosineTransform transform, PlanarLight light, PlaneView view)
+// A light about the foot of the point on its plane, not pinned.
+CosineLight near_light(CosineTransform transform, PlanarLight light, PlaneView view)
 {
     CosineLight result;
     result.u = transform.points * light.u;
     result.v = transform.points * light.v;
     result.u_cross_v = transform.normals * light.n;
+    result.anchor = view.foot;
+    result.anchor_low = view.foot_low;
+    result.center = transform.points * (view.depth * light.n);
+    result.center_cross_u = view.depth * (transform.normals * light.v);
+    result.center_cross_v = -view.depth * (transform.normals * light.u);
+    result.pin = 0.0;
+    return result;
+}
+
+CosineLight cosine_light(CosineTransform transform, PlanarLight light, PlaneView view)
+{
+    CosineLight result = near_light(transform, light, view);
     vec3 c = transform.points * view.offset;
     float c2 = dot(c, c);
     float extent2 =
@@ -265,13 +293,6 @@ CosineLight cosine_light(CosineTransform transform, PlanarLight light, PlaneView
         // Where W(center) is below half |center|^2 all of the light is below z = 0.
         float top = max(c.z, 0.0);
         result.pin = 1.0 / max(dot(c.xy, c.xy) + top * top, 0.5 * c2);
-    } else {
-        result.anchor = view.foot;
-        result.anchor_low = view.foot_low;
-        result.center = transform.points * (view.depth * light.n);
-        result.center_cross_u = view.depth * (transform.normals * light.v);
-        result.center_cross_v = -view.depth * (transform.normals * light.u);
-        result.pin = 0.0;
     }
     return result;
 }

@@ -57,7 +57,6 @@ GPU_ONLY = {
     "fan_node": STAGE,
     "ggx_light": STAGE,
     "direction_difference": STAGE,
-    "edge_normal": STAGE,
     "is_pinned": STAGE,
     "add_pinned_edge": STAGE,
     "pinned_vector": STAGE,

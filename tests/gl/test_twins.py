@@ -53,18 +53,21 @@ TWINS = {
 }
 THROUGH_PROBE = "a stage of the integral, tested whole by test_probe.py"
 THROUGH_CURVES = "a stage of the integral along curves, tested whole by test_curves.py"
+THROUGH_ADAPTIVE = "a stage of the published methods, tested whole by test_adaptive.py"
 GPU_ONLY = {
+    "add_chord": THROUGH_ADAPTIVE,
+    "add_chords": THROUGH_ADAPTIVE,
+    "specular_triangle": THROUGH_ADAPTIVE,
+    "add_divided_curve": THROUGH_ADAPTIVE,
     "power_curve": THROUGH_CURVES,
     "curve_point": THROUGH_CURVES,
     "curve_way": THROUGH_CURVES,
     "bernstein": THROUGH_CURVES,
     "curve_node": THROUGH_CURVES,
     "curve_form": THROUGH_CURVES,
-    "is_far": THROUGH_CURVES,
     "nearest_pole": THROUGH_CURVES,
+    "pole_ellipse": THROUGH_CURVES,
     "curve_integral": THROUGH_CURVES,
-    "add_pinned_curve": THROUGH_CURVES,
-    "azimuth_between": THROUGH_CURVES,
     "add_curve": THROUGH_CURVES,
     "lobe_density": THROUGH_CURVES,
     "sliver_integral": THROUGH_CURVES,
@@ -79,6 +82,9 @@ GPU_ONLY = {
     "pinned_weight": THROUGH_PROBE,
     "pinned_edge": THROUGH_PROBE,
     "add_edge": THROUGH_PROBE,
+    "edge_plane": THROUGH_PROBE,
+    "near_light": THROUGH_PROBE,
+    "add_near_edge": THROUGH_CURVES,
     "form_factor": THROUGH_PROBE,
     "contour_start": THROUGH_PROBE,
     "contour_ends": THROUGH_PROBE,
