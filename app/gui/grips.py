@@ -20,6 +20,10 @@ CROWD = 16
 """Corners and anchors from which on they are drawn smaller, and handles only where selected."""
 MOST_VERTICES = 400
 """Corners and anchors in the picture beyond which none is shown: they would hide the light."""
+DENSE = 18.0
+"""Mean length of segments in points below which vertices are shown beside the selected one only.
+
+They would hide the light, as with a word; who looks closer can edit its letters."""
 SHORTEST_EDGE = 56.0
 """Length in points from which on a segment offers a point to add a vertex."""
 APART, FAR_APART = 2.0, 16.0
@@ -66,12 +70,16 @@ def grips_of(
     segments = contours.segments_of(light.outline)
     screen = _places(sight, light, segments.curves)
     middles = _places(sight, light, evaluate(segments.curves, 0.5))
-    roomy = _lengths(screen) >= SHORTEST_EDGE
-    crowded = is_crowded(light)
+    lengths = _lengths(screen)
+    roomy, crowded = lengths >= SHORTEST_EDGE * sight.unit, is_crowded(light)
+    shown = lengths[np.isfinite(lengths)]
+    dense = len(shown) > CROWD and float(shown.mean()) < DENSE * sight.unit
     found: list[Grip] = []
     for number, contour in enumerate(light.outline.contours):
         first, kinds = segments.starts[number], contours.kinds_of(contour)
         near = selected[1] if selected is not None and selected[0] == number else None
+        if dense and near is None:
+            continue
         beside = set() if near is None else {near, (near - 1) % len(kinds)}
         for index, kind in enumerate(kinds):
             row = screen[first + index]

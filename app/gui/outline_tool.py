@@ -58,12 +58,18 @@ class OutlineTool:
     ----------
     messages : Messages
         Gets what cannot be done.
+
+    Attributes
+    ----------
+    shown : tuple of (contour, point)
+        The vertices drawn last.
     """
 
     def __init__(self, messages: Messages) -> None:
         self._messages = messages
         self._drag: Drag | None = None
         self._was_free = False
+        self.shown: tuple[tuple[int, int], ...] = ()
         self._asked: Spot | None = None
 
     @property
@@ -102,6 +108,7 @@ class OutlineTool:
         held = self._drag.item if self._drag is not None else ""
         canvas = Canvas(imgui.get_window_draw_list(), sight, is_crowded(light))
         grips = grips_of(sight, light, chosen, held)
+        self.shown = tuple((g.contour, g.index) for g in grips if g.what == "vertex")
         mouse = imgui.get_io().mouse_pos
         near = nearest_grip(grips, mouse.x, mouse.y, sight.unit * HANDLE)
         if self._drag is not None:

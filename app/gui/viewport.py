@@ -78,7 +78,7 @@ class Viewport:
         self._hidden: frozenset[tuple[int, int]] = frozenset()
         self._unasked: list[tuple[tuple[int, int], Vec2]] = []
         self._is_asking = False
-        self._occlusion_of: tuple[Shot | None, int] | None = None
+        self._occlusion_of: tuple[Shot | None, int, tuple[lights.Vertex, ...]] | None = None
         self._hovered_light: int | None = None
         self._asked: Hit | None = None
 
@@ -317,9 +317,9 @@ class Viewport:
             if chosen.kind == "light" and chosen.index == index:
                 canvas.outline(light, theme.ACCENT, 1.0, 1.8)
                 canvas.direction(light)
+                self.outline.draw(editor, sight, self._hidden)
                 if self.is_settled:
                     self._find_hidden(scene, index)
-                self.outline.draw(editor, sight, self._hidden)
             elif index == self._hovered_light:
                 canvas.outline(light, theme.ACCENT, 0.55, 1.5)
             elif not light.visible:
@@ -332,9 +332,12 @@ class Viewport:
     def _find_hidden(self, scene: Scene, index: int) -> None:
         """Find out, a few at a time once nothing moves, which corners are behind something."""
         light, camera = scene.lights[index], self.camera_of(scene)
-        if self._occlusion_of != (self.picture.shot, index):
-            self._occlusion_of = (self.picture.shot, index)
-            self._unasked = lights.vertices_of(light)[:MOST_ASKED]
+        shown = self.outline.shown
+        if self._occlusion_of != (self.picture.shot, index, shown):
+            self._occlusion_of = (self.picture.shot, index, shown)
+            places = dict(lights.vertices_of(light))
+            asked = [(vertex, places[vertex]) for vertex in shown if vertex in places]
+            self._unasked = asked[:MOST_ASKED]
         end = time.perf_counter() + ASKING
         while self._unasked and time.perf_counter() < end:
             vertex, point = self._unasked.pop()

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from app.editor import Selection
 from app.gui.shortcuts import key_of
 from app.panels.widgets import MUTED
-from app.scene import BezierContour, Scene
+from app.scene import BezierContour, Scene, TextSource
 
 
 def help_line(scene: Scene, selection: Selection, tool: str) -> str:
@@ -21,6 +21,13 @@ def help_line(scene: Scene, selection: Selection, tool: str) -> str:
             kinds = f"{key_of('smooth')} smooth, {key_of('corner')} corner"
             return f"Drag anchor and handles, Alt frees one · {kinds} · {removes}"
         return f"Drag the corner · {removes} · drag a dot between corners to add one"
+    if selection.kind == "light" and scene.lights[selection.index].source is not None:
+        what = scene.lights[selection.index].source
+        if isinstance(what, TextSource):
+            return (
+                "Type its text in the Light panel · drop a font on it · come closer for its points"
+            )
+        return "Its drawing is chosen in the Light panel · come closer for its points"
     if selection.kind == "light":
         if tool == "move":
             use = f"drag the arrows to move the light · {key_of('rotate')} to rotate"
