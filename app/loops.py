@@ -23,6 +23,9 @@ Piece = tuple[tuple[float, float], ...]
 SMOOTH = math.radians(1.0)
 """Anchors whose handles bend by less are smooth: whole font units turn short handles so far."""
 
+STRAIGHT_TURN = 1e-9
+"""A bend by less, in radians, is a rounding."""
+
 SNAP = 1e-9
 """A loop whose ends are closer than this share of its reach is closed: a file's rounding."""
 
@@ -69,6 +72,23 @@ def _is_flat(curves: FloatArray) -> bool:
 
 def _line(pieces: FloatArray) -> FloatArray:
     return line_as_cubic(pieces[:, 0], pieces[:, 1])
+
+
+def convex_turn(loop: FloatArray) -> int:
+    """Return 1 for a loop (k, 4, 2) around a convex inside, counter-clockwise, −1 if clockwise.
+
+    0 if the polygon of its control points is not convex.
+    """
+    steps = np.diff(loop[:, :, :], axis=1).reshape(-1, 2)
+    steps = steps[np.any(steps != 0.0, axis=1)]
+    following = np.roll(steps, -1, axis=0)
+    across = steps[:, 0] * following[:, 1] - steps[:, 1] * following[:, 0]
+    turns = np.arctan2(across, np.sum(steps * following, axis=1))
+    total = float(np.sum(turns))
+    sign = 1 if total > 0.0 else -1
+    # Once around, and never back by more than the roundings of a straight stretch.
+    once = abs(abs(total) - 2.0 * math.pi) < 1e-6
+    return sign if once and bool(np.all(sign * turns > -STRAIGHT_TURN)) else 0
 
 
 def extent(loops: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:

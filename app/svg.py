@@ -12,6 +12,7 @@ have the same and none reaches into another's box, they are kept as written.
 Otherwise an element that may overlap others, or whose rule is ``evenodd``, is
 replaced by its boundary (`app.outline.boundary`), which winds once around the
 inside, and ``nonzero`` joins the elements: windings of their insides only add.
+A convex element is its own boundary, turned the right way.
 """
 
 from __future__ import annotations
@@ -24,12 +25,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from app.curves import reversed_curves
 from app.errors import InputError
-from app.loops import closed_loop, extent, outline_of
+from app.loops import closed_loop, convex_turn, extent, outline_of
 from app.outline import boundary
 from app.scene import FillRule, Outline, SvgSource
 from app.svg_paths import LARGEST_NUMBER, Box, SvgError, length, shape, transform, view_box
-from app.svg_tree import DEEPEST, Node, all_nodes, read_tree, style_of, style_rules
+from app.svg_tree import DEEPEST, Node, all_nodes, read_tree, style_of, style_sheet
 
 FloatArray = NDArray[np.float64]
 
@@ -38,6 +40,9 @@ MOST_ELEMENTS = 200_000
 
 DEFAULT_BOX: Box = (300.0, 150.0)
 """The viewport of a drawing that says nothing about its size, as in CSS."""
+
+MOST_CURVES = 100_000
+"""Curves of a drawing; a light with a thousandth of that is elaborate."""
 
 SMALLEST = 1e-100
 """Drawings whose longer side is less are nothing."""
@@ -125,11 +130,12 @@ class _Collector:
         self.left_out: Counter[str] = Counter()
         self._path = path
         self._root = root
-        self._rules = style_rules(root)
+        self._sheet = style_sheet(root)
         self._by_id: dict[str, Node] = {}
         for node in all_nodes(root):
             self._by_id.setdefault(node.attributes.get("id", ""), node)
         self._visited = 0
+        self._curves = 0
 
     def draw_root(self) -> None:
         """Collect everything."""
@@ -144,7 +150,7 @@ class _Collector:
                 f"{self._path}: line {node.line}: copies of copies make more than "
                 f"{MOST_ELEMENTS} elements or {DEEPEST} levels, expected a drawing"
             )
-        style = style_of(node, self._rules, inherited)
+        style = style_of(node, self._sheet, inherited)
         if style.get("display") == "none" or _is_zero(style.get("opacity")):
             return
         try:
@@ -187,6 +193,9 @@ class _Collector:
             raise SvgError(
                 f"found coordinates beyond {LARGEST_NUMBER:g}, expected smaller transforms"
             )
+        self._curves += sum(len(loop) for loop in placed)
+        if self._curves > MOST_CURVES:
+            raise SvgError(f"found more than {MOST_CURVES} curves so far, expected at most these")
         self.elements.append(_Element(placed, rule))
 
     def _viewport(
@@ -281,6 +290,8 @@ def _joined(elements: list[_Element]) -> Outline | None:
     for element, is_alone in zip(elements, alone, strict=True):
         if is_alone and element.rule == "nonzero":
             loops += element.loops
+        elif len(element.loops) == 1 and (turn := convex_turn(element.loops[0])):
+            loops.append(element.loops[0] if turn > 0 else reversed_curves(element.loops[0]))
         else:
             loops += boundary(outline_of(element.loops, element.rule))
     return outline_of(loops, "nonzero") if loops else None

@@ -38,11 +38,11 @@ UNITS = {
 }  # fmt: skip
 """Pixels of a unit of length; those of a font are a browser's for its default font."""
 
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
 GAP = re.compile(r"[\s,]*")
 FLAG = re.compile(r"[01]")
 LENGTH = re.compile(rf"\s*({NUMBER.pattern})\s*([a-zA-Z]*|%)\s*")
-FUNCTION = re.compile(r"[\s,]*([a-zA-Z]+)\s*\(([^()]*)\)")
+FUNCTION = re.compile(r"([a-zA-Z]+)\s*\(([^()]*)\)")
 
 ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 """How many numbers the commands of path data take."""
@@ -96,13 +96,13 @@ def numbers(text: str) -> list[float]:
 
 def transform(text: str) -> FloatArray:
     """Return the matrix (3, 3) of a list of transforms, which acts on columns (x, y, 1)."""
-    matrix, position = np.eye(3), 0
-    while text[position:].strip(" \t\r\n,"):
+    matrix, position = np.eye(3), _after_gap(text, 0)
+    while position < len(text):
         match = FUNCTION.match(text, position)
         if match is None:
             raise SvgError(f"found {quote(text[position:])}, expected a transform")
         matrix = matrix @ _function(match[1], numbers(_without_units(match[2])))
-        position = match.end()
+        position = _after_gap(text, match.end())
     return matrix
 
 

@@ -9,7 +9,7 @@ selectors (names, classes, ids) of ``<style>``.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ class Node:
     attributes: dict[str, str]
     line: int
     children: list[Node] = field(default_factory=list)
-    text: str = ""
+    texts: list[str] = field(default_factory=list)
 
 
 def read_tree(path: Path) -> Node:
@@ -88,7 +88,7 @@ def read_tree(path: Path) -> Node:
 
     def text(characters: str) -> None:
         if stack[-1].tag == "style":
-            stack[-1].text += characters
+            stack[-1].texts.append(characters)
 
     def entity(*declared: Any) -> None:
         name, is_parameter, value = declared[:3]
@@ -163,28 +163,60 @@ class Rule:
     def weight(self) -> tuple[int, int, bool]:
         return len(self.ids), len(self.classes), self.tag not in ("", "*")
 
+    @property
+    def key(self) -> str:
+        """One thing that an element must have for the rule to apply, empty if there is none."""
+        for sign, names in (("#", self.ids), (".", self.classes)):
+            if names:
+                return sign + min(names)
+        return "" if self.tag == "*" else self.tag
 
-def style_of(node: Node, rules: Sequence[Rule], inherited: dict[str, str]) -> dict[str, str]:
+
+class StyleSheet:
+    """The rules of a drawing, found by what they apply to."""
+
+    def __init__(self, rules: Iterable[Rule]) -> None:
+        self._by_key: dict[str, list[tuple[int, Rule]]] = {}
+        for order, rule in enumerate(sorted(rules, key=lambda rule: rule.weight)):
+            self._by_key.setdefault(rule.key, []).append((order, rule))
+
+    def of(self, node: Node) -> list[Rule]:
+        """Return the rules that apply to an element, those that win last."""
+        if not self._by_key:
+            return []
+        classes = node.attributes.get("class", "").split()
+        keys = {
+            "",
+            node.tag,
+            "#" + node.attributes.get("id", ""),
+            *("." + name for name in classes),
+        }
+        found = [pair for key in keys for pair in self._by_key.get(key, ())]
+        return [rule for _, rule in sorted(found, key=lambda pair: pair[0]) if rule.applies(node)]
+
+
+def style_of(node: Node, sheet: StyleSheet, inherited: dict[str, str]) -> dict[str, str]:
     """Return an element's style from that of the one around it, in lower case."""
     style = {key: value for key, value in inherited.items() if key in INHERITED}
     own = {key: node.attributes[key].strip().lower() for key in STYLED if key in node.attributes}
-    for rule in rules:
-        if rule.applies(node):
-            own |= rule.values
+    for rule in sheet.of(node):
+        own |= rule.values
     own |= _declarations(node.attributes.get("style", ""))
     return style | {key: value for key, value in own.items() if value != "inherit"}
 
 
-def style_rules(root: Node) -> list[Rule]:
-    """Return the rules of all style sheets, those that win last."""
-    sheet = "".join(node.text for node in all_nodes(root) if node.tag == "style")
-    sheet = re.sub(r"/\*.*?\*/", " ", sheet, flags=re.DOTALL)
+def style_sheet(root: Node) -> StyleSheet:
+    """Return the rules of all style sheets of a drawing."""
+    sheet = "".join(part for node in all_nodes(root) if node.tag == "style" for part in node.texts)
     rules = []
-    for selectors, body in re.findall(r"([^{};]+)\{([^{}]*)\}", sheet):
+    for block in _without_comments(sheet).split("}"):
+        head, _, body = block.rpartition("{")
         values = _declarations(body)
+        # What comes before belongs to @media and @import, whose conditions are taken as met.
+        selectors = head.rpartition("{")[2].rpartition(";")[2] if values else ""
         for selector in selectors.split(","):
             match = SELECTOR.fullmatch(selector.strip())
-            if match is None or not match[0] or not values:
+            if match is None or not match[0]:
                 continue
             names = re.findall(r"([.#])([\w-]+)", match[2])
             rules.append(
@@ -195,7 +227,16 @@ def style_rules(root: Node) -> list[Rule]:
                     values,
                 )
             )
-    return sorted(rules, key=lambda rule: rule.weight)
+    return StyleSheet(rules)
+
+
+def _without_comments(sheet: str) -> str:
+    kept, position = [], 0
+    while (start := sheet.find("/*", position)) >= 0:
+        kept.append(sheet[position:start])
+        end = sheet.find("*/", start + 2)
+        position = end + 2 if end >= 0 else len(sheet)
+    return " ".join([*kept, sheet[position:]])
 
 
 def _declarations(text: str) -> dict[str, str]:

@@ -47,6 +47,9 @@ LARGEST_FONT = 128 * 2**20
 LONGEST_TEXT = 10_000
 """Characters of a text; thousands of letters are already more curves than a light needs."""
 
+LARGEST_EXTENT = 1e15
+"""In units of the plane; what is larger has squares that leave float32."""
+
 TAB = "    "
 
 SPREAD = {"liga": False, "clig": False}
@@ -95,6 +98,11 @@ def text_outline(source: TextSource) -> Outline:
     if not loops:
         raise InputError(f"{path}: the text has nothing to draw, expected letters with an outline")
     low, high = extent(loops)
+    farthest = float(np.max(high - low)) * source.size / font.em
+    if not farthest <= LARGEST_EXTENT:
+        raise InputError(
+            f"the text is {farthest:g} long or high, expected at most {LARGEST_EXTENT:g}"
+        )
     middle = 0.5 * (low + high)
     scale = source.size / font.em
     return outline_of([(loop - middle) * scale for loop in loops], "nonzero")

@@ -324,6 +324,8 @@ EIGHT = '<path d="M10 10L50 50V10L10 50z" {}/>'
         (EIGHT, 800),
         (EIGHT + RIGHT, 1600),
         (EIGHT + '<path d="M10 10v40h40v-40z"/>', 1600),
+        (RIGHT + '<path d="M30 30h-10l-5 10z"/>', 1600),
+        (RIGHT + '<path d="M60 30h-20v10z"/><path d="M60 30h-20v-10z"/>', 1600 + 2 * 25),
         (EIGHT + '<rect x="60" y="60" width="10" height="10" fill-rule="evenodd"/>', 900),
     ],
 )
@@ -493,7 +495,8 @@ def test_entities_that_grow_are_refused(file: Path) -> None:
     assert "used more than" in refused(file, many)
 
 
-def test_copies_without_end_are_refused(file: Path) -> None:
+def test_copies_without_end_are_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(svg, "MOST_ELEMENTS", 20_000)
     start = time.perf_counter()
     itself = '<g id="a"><path d="M0 0h1v1z"/><use href="#a"/></g>'
     assert "copies of copies" in refused(file, page(itself))
@@ -506,6 +509,34 @@ def test_copies_without_end_are_refused(file: Path) -> None:
 def test_huge_files_are_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(svg_tree, "LARGEST_FILE", 100)
     assert "expected at most 100" in refused(file, page("<g/>" * 100))
+
+
+def test_hostile_text_takes_no_longer(file: Path) -> None:
+    start = time.perf_counter()
+    many = 200_000
+    for elements in (
+        f"<style>{'a' * many}</style>",
+        f"<style>{'/*' * many}</style>",
+        "<style>" + "".join(f".c{i}{{fill:none}}" for i in range(5000)) + "</style>"
+        + '<path class="c7 c8" d="M0 0h1v1z"/>' * 5000,
+        f'<g transform="{"scale(1)" * (many // 20)}"/>',
+    ):  # fmt: skip
+        assert "nothing filled" in refused(file, page(elements))
+    for elements in (
+        f'<rect width="{"1" * many}x"/>',
+        f'<path d="M0 0L{"1" * many}"/>',
+        f'<path d="M0 0{"h" * many}"/>',
+        f'<polygon points="{"1" * many}x"/>',
+    ):
+        assert len(refused(file, page(elements))) < 200
+    assert time.perf_counter() - start < 20.0
+
+
+def test_too_many_curves_are_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(svg, "MOST_CURVES", 10)
+    assert "line 1: <path>: found more than 10 curves" in refused(
+        file, page('<path d="M0 0h1v1z"/>' * 4)
+    )
 
 
 def test_damaged_drawings_are_outlines_or_sentences(file: Path) -> None:
