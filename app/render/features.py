@@ -22,9 +22,10 @@ from app.render.pack import (
     TEXELS_PER_LIGHT,
     TEXELS_PER_MATERIAL,
     TEXELS_PER_NODE,
+    CurveForm,
     has_curves,
     light_geometry,
-    node_count,
+    part_count,
 )
 from app.render.techniques import DEFAULT_TECHNIQUE, find_technique, parse_technique
 from app.scene import AreaLight, Scene
@@ -67,16 +68,14 @@ def _rounded(count: int) -> int:
 class LightNeeds:
     """The lights of a scene that reach surfaces.
 
-    ``parts`` counts edges, or where a light has curves the nodes of all trees, or
-    curves themselves where the technique takes them ``whole``;
-    ``uniform_texels`` is the uniform block's array length, 0 where the lights
-    need a texture (or there are none).
+    ``curves`` says how curves are packed, ``parts`` counts what they then are:
+    edges, nodes of trees, or the curves themselves; ``uniform_texels`` is the uniform
+    block's array length, 0 where the lights need a texture (or there are none).
     """
 
     count: int
     parts: int
-    curved: bool
-    whole: bool
+    curves: CurveForm
     texels: int
     one_sided: bool
     two_sided: bool
@@ -94,11 +93,9 @@ class LightNeeds:
             for light, geometry in zip(lights, geometries, strict=True)
             if any(light.radiance) and geometry.parts
         ]
-        curved = has_curves(lights)
-        whole = curved and find_technique(technique).curve_rule > 0
-        parts = sum(
-            node_count(item, whole) if curved else light_geometry(item).parts for item in shining
-        )
+        curves = parse_technique(technique).curves if has_curves(lights) else 1
+        curved = not isinstance(curves, int)
+        parts = sum(part_count(item, curves) for item in shining)
         size = TEXELS_PER_NODE if curved else TEXELS_PER_EDGE
         texels = TEXELS_PER_LIGHT * len(lights) + size * parts
         if texels > limits.storage_texels:
@@ -110,8 +107,7 @@ class LightNeeds:
         return cls(
             len(lights),
             parts,
-            curved,
-            whole,
+            curves,
             texels,
             any(not light.two_sided for light in shining),
             any(light.two_sided for light in shining),
@@ -120,13 +116,18 @@ class LightNeeds:
         )
 
     @property
+    def curved(self) -> bool:
+        """Whether shaders integrate along curves."""
+        return not isinstance(self.curves, int)
+
+    @property
     def part_name(self) -> str:
         """What ``parts`` counts."""
-        return "curve" if self.whole else "node" if self.curved else "edge"
+        return {"tree": "node", "whole": "curve"}.get(str(self.curves), "edge")
 
     def technique(self, wanted: str) -> str:
-        """Return whose shaders integrate these lights: without curves the published are ``ltc``."""
-        if find_technique(wanted).curve_rule and not self.curved:
+        """Return whose shaders integrate these lights: ``ltc`` if only curves would differ."""
+        if parse_technique(wanted).follows_ltc and self.curves != "whole":
             return DEFAULT_TECHNIQUE
         return wanted
 
@@ -199,7 +200,9 @@ class LightingFeatures:
             samples > 1,
             lights,
             rounded if fits else 0,
-            lights.technique(technique) if specular or lights.whole else DEFAULT_TECHNIQUE,
+            lights.technique(technique)
+            if specular or lights.curves == "whole"
+            else DEFAULT_TECHNIQUE,
             specular
             and find_technique(technique).anisotropic
             and any(material.is_anisotropic and any(material.f0) for material in used),
@@ -246,8 +249,8 @@ def technique_defines(technique: str) -> dict[str, int]:
         "TECHNIQUE_GGX": int(choice.name == "ggx"),
         "CURVE_RULE": choice.technique.curve_rule,
     }
-    if choice.number is not None:
-        defines["GGX_NODES" if choice.name == "ggx" else "UNIFORM_EDGES"] = choice.number
+    if choice.name == "ggx" and choice.number is not None:
+        defines["GGX_NODES"] = choice.number
     return defines
 
 

@@ -66,7 +66,7 @@ class LightingPass:
     def set_lights(self, lights: Sequence[AreaLight], needs: LightNeeds) -> None:
         """Hold the texels of ``lights``."""
         self._light_count = len(lights)
-        self._lights.update(pack_lights(lights, needs.whole), needs.uniform_texels)
+        self._lights.update(pack_lights(lights, needs.curves), needs.uniform_texels)
 
     def set_materials(self, materials: Sequence[Material], uniform_texels: int) -> None:
         """Hold one record per object."""

@@ -13,11 +13,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.curves import derivative, evaluate, line_as_cubic
+from app.curves import derivative, evaluate, is_straight, line_as_cubic
 from app.errors import InputError
 from app.outline import boundary, resolve
 from app.render.caching import ByteCache
@@ -67,6 +68,10 @@ TEXELS_PER_EDGE = 2
 TEXELS_PER_NODE = 4
 MAX_INDEX = 2**24
 """Texel indices are stored as float32."""
+CurveForm: TypeAlias = Literal["tree", "whole"] | int
+"""How curves are packed: cut into a tree (`app.render.contour_tree`), each as it is, or
+as so many edges."""
+
 CACHED_BYTES = 16 * 2**20
 """Of each of the three things that are kept of every light."""
 SMALLEST_AREA = 1e-30
@@ -206,16 +211,14 @@ def edges_of(loops: Sequence[FloatArray]) -> FloatArray:
     )
 
 
-def pack_lights(lights: Sequence[AreaLight], whole: bool = False) -> NDArray[np.float32]:
+def pack_lights(lights: Sequence[AreaLight], curves: CurveForm = "tree") -> NDArray[np.float32]:
     """Return (n, 4) float32 texels: all headers, then all edges, or all nodes.
 
     If one light has curves (`has_curves`) every light's outline becomes a tree, so
-    that one walk serves all. A light without radiance keeps its header and gets no
-    outline: nothing to integrate. ``whole`` leaves curves uncut and without a tree
-    over them, for techniques that take them so.
+    that one walk serves all, unless ``curves`` says otherwise. A light without
+    radiance keeps its header and gets no outline: nothing to integrate.
     """
-    pack = (_packed_whole if whole else _packed_tree) if has_curves(lights) else _packed_edges
-    packed = [pack(light) for light in lights]
+    packed = [_packed_light(light, curves if has_curves(lights) else 1) for light in lights]
     header = np.concatenate([np.zeros(0, LIGHT_HEADER), *(record for record, _ in packed)])
     counts = np.array([len(parts) for _, parts in packed], dtype=np.int64)
     before = np.cumsum(counts) - counts
@@ -224,27 +227,40 @@ def pack_lights(lights: Sequence[AreaLight], whole: bool = False) -> NDArray[np.
     return np.concatenate([texels, *(parts for _, parts in packed)])
 
 
-def node_count(light: AreaLight, whole: bool = False) -> int:
-    """Return the nodes of a light's tree, see `app.render.contour_tree`, or its whole curves."""
-    return len((_packed_whole if whole else _packed_tree)(light)[1]) // TEXELS_PER_NODE
+def part_count(light: AreaLight, curves: CurveForm) -> int:
+    """Return the nodes or edges that a light's outline is packed as."""
+    return int(_packed_light(light, curves)[0]["part_count"][0])
 
 
 Packed = tuple[NDArray[np.void], NDArray[np.float32]]
 """A header (1,), still without its first part, and texels (n, 4)."""
 
 
-def _pack_edges(light: AreaLight) -> Packed:
+def _pack_light(light: AreaLight, curves: CurveForm) -> Packed:
+    if isinstance(curves, int):
+        return _pack_edges(light, curves)
+    return _pack_nodes(light, contour_tree if curves == "tree" else curve_list)
+
+
+def _pack_edges(light: AreaLight, per_curve: int) -> Packed:
     geometry = light_geometry(light)
-    edges = edges_of(geometry.loops if any(light.radiance) else ())
+    loops = [
+        inscribed(loop, per_curve) if loop.ndim == 3 else loop
+        for loop in (geometry.loops if any(light.radiance) else ())
+    ]
+    edges = edges_of(loops)
     return _header(light, geometry, len(edges)), np.stack(_split(edges), axis=1).reshape(-1, 4)
 
 
-def _pack_tree(light: AreaLight) -> Packed:
-    return _pack_nodes(light, contour_tree)
+def inscribed(loop: FloatArray, per_curve: int) -> FloatArray:
+    """Return the polygon of a loop of cubics (k, 4, 2) at equal steps of their parameters.
 
-
-def _pack_whole(light: AreaLight) -> Packed:
-    return _pack_nodes(light, curve_list)
+    Straight ones are one edge each.
+    """
+    t = np.arange(per_curve) / per_curve
+    points = evaluate(loop[:, None], t)
+    keep = ~is_straight(loop)[:, None] | (np.arange(per_curve) == 0)
+    return np.asarray(points[keep])
 
 
 def _pack_nodes(light: AreaLight, nodes_of: Callable[[Sequence[FloatArray]], TreeNodes]) -> Packed:
@@ -308,6 +324,4 @@ def pack_materials(materials: Sequence[Material]) -> NDArray[np.float32]:
 
 # Hashing and per-entry overhead are worth about 1 KB.
 _geometries = ByteCache(_checked_geometry, lambda g: 1024 + g.bytes, CACHED_BYTES)
-_packed_edges = ByteCache(_pack_edges, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
-_packed_tree = ByteCache(_pack_tree, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
-_packed_whole = ByteCache(_pack_whole, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)
+_packed_light = ByteCache(_pack_light, lambda p: 1024 + p[1].nbytes, CACHED_BYTES)

@@ -21,6 +21,7 @@ from app.render.camera import CameraFrame
 from app.render.features import LightNeeds, Limits
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
+from app.render.pack import CurveForm
 from app.render.plan import ATTACHMENTS, FORMAT_BYTES, Needs, Plan, make_plan, needs_of
 from app.render.post import DisplayPass
 from app.render.programs import Programs
@@ -166,7 +167,7 @@ class Renderer:
         self._timers = PassTimers(ctx)
         self._cpu_ms = 0.0
         self._held: Scene | None = None
-        self._held_lights: tuple[object, tuple[bool, int]] | None = None
+        self._held_lights: tuple[object, tuple[CurveForm, int]] | None = None
         self._held_materials: tuple[object, object, int] | None = None
         self._needs: Needs | None = None
         self._seen: _Seen | None = None
@@ -565,7 +566,7 @@ class Renderer:
 
     def _hold_lights(self, scene: Scene, needs: LightNeeds) -> None:
         held = self._held_lights
-        layout = (needs.whole, needs.uniform_texels)
+        layout = (needs.curves, needs.uniform_texels)
         if held is None or held[0] is not scene.lights or held[1] != layout:
             self._lighting.set_lights(scene.lights, needs)
             self._held_lights = (scene.lights, layout)

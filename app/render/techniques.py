@@ -11,7 +11,7 @@ To add one: a line here, its entry function in ``shaders/``, and a feature in
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from app.errors import InputError, expected_one_of, quote
 from app.scene import Scene
@@ -39,9 +39,11 @@ class Technique:
         Whether it shades alpha_x apart from alpha_y, and so reads tangents.
     has_tables : bool
         Whether its specular part looks up the tables of `app.render.tables`.
+    curves : {"tree", "whole", "edges"}
+        How it takes curves: cut into a tree of pieces that turn little; each as it is; or as
+        so many edges as its number says, which makes polygons of them.
     curve_rule : int
-        The feature CURVE_RULE: how it integrates along curves. All but 0 are published
-        methods that take every curve whole, and are ``ltc`` where there is none.
+        The feature CURVE_RULE: how it integrates along curves that are whole.
     parameter : Parameter, optional
         What a number behind its name means.
     """
@@ -49,6 +51,7 @@ class Technique:
     description: str
     anisotropic: bool
     has_tables: bool
+    curves: Literal["tree", "whole", "edges"] = "tree"
     curve_rule: int = 0
     parameter: Parameter | None = None
 
@@ -72,19 +75,21 @@ TECHNIQUES: dict[str, Technique] = {
         "et al. 2022",
         anisotropic=False,
         has_tables=True,
+        curves="whole",
         curve_rule=1,
     ),
     "adaptive-extrapolated": Technique(
         "adaptive with the same chords, extrapolated to the curve",
         anisotropic=False,
         has_tables=True,
+        curves="whole",
         curve_rule=2,
     ),
     "uniform": Technique(
         "ltc with every curve cut into the same number of edges",
         anisotropic=False,
         has_tables=True,
-        curve_rule=3,
+        curves="edges",
         parameter=Parameter("edges a curve", 1, 4096, 18),
     ),
 }
@@ -109,6 +114,20 @@ class Choice(NamedTuple):
     def technique(self) -> Technique:
         """What the renderer must know of it."""
         return TECHNIQUES[self.name]
+
+    @property
+    def curves(self) -> Literal["tree", "whole"] | int:
+        """How curves are packed for it, as `app.render.pack.CurveForm`."""
+        form = self.technique.curves
+        if form != "edges":
+            return form
+        assert self.number is not None
+        return self.number
+
+    @property
+    def follows_ltc(self) -> bool:
+        """Whether it is ``ltc`` but for how it takes curves."""
+        return self.technique.curves != "tree"
 
     def __str__(self) -> str:
         parameter = self.technique.parameter

@@ -1,50 +1,44 @@
-// Curves by straight edges: the published methods, for comparison. Twin: ltc.adaptive.
+// Curves by straight edges, as published, for comparison. Twin: ltc.adaptive.
 //
 // CURVE_RULE 1 halves a curve's intervals until the triangle between a chord and the chords of
 // its halves adds little to the form factor (Kuge et al. 2022, listing 1); 2 is the same
-// with leaves extrapolated to the curve; 3 takes UNIFORM_EDGES edges a curve. Instead of the
+// with leaves extrapolated to the curve. Instead of the
 // published stack a counter walks the intervals: `index` of those `level` halvings
 // deep, from left to right, which needs no memory and cannot overflow.
 // A chord's way is taken from the powers of t, where nothing cancels.
 
 #include "ltc/curve.glsl"
 
-// The chord of [from, to], whose ends are above the cosine's horizon up to rounding. (The
-// sign of such an end says nothing, so an edge's own clipping would go astray.)
-void add_chord(CosineLight light, PowerCurve curve, float from, float to, inout ContourSum sum)
+vec3 point_at(CosineLight light, vec2 p)
+{
+    return light.center + p.x * light.u + p.y * light.v;
+}
+
+// Lambert's term of the chord of [from, to], whose ends are above the cosine's horizon up to
+// rounding. (The sign of such an end says nothing, so an edge's own clipping would go astray.)
+float chord_angle(CosineLight light, PowerCurve curve, float from, float to)
 {
     vec2 a = curve_point(curve, from);
-    vec2 b = curve_point(curve, to);
     vec2 d = (to - from) * (curve.c1 + (from + to) * curve.c2 +
                             (from * from + from * to + to * to) * curve.c3);
-    float moment = cross_2d(a, d);
-    vec3 dp = a.x * light.u + a.y * light.v;
-    vec3 dq = b.x * light.u + b.y * light.v;
-    vec3 w = d.x * light.center_cross_u + d.y * light.center_cross_v + moment * light.u_cross_v;
-    if (light.pin > 0.0) {
-        sum.area += moment;
-        sum.angle += pinned_edge(light, dp, dq, w.z);
-        return;
-    }
+    vec3 w = d.x * light.center_cross_u + d.y * light.center_cross_v +
+             cross_2d(a, d) * light.u_cross_v;
     float w2 = dot(w, w);
     float inverse = w2 < 1e-36 ? 0.0 : inversesqrt(w2);
-    float cosine = dot(light.center + dp, light.center + dq);
-    sum.angle += w.z * inverse * positive_atan2(w2 * inverse, cosine);
+    float cosine = dot(point_at(light, a), point_at(light, curve_point(curve, to)));
+    return w.z * inverse * positive_atan2(w2 * inverse, cosine);
 }
 
-#if CURVE_RULE == 3
-
-// The polygon's edges, its vertices at equal steps of the whole curve.
-void add_chords(CosineLight light, PowerCurve curve, float from, float to, inout ContourSum sum)
+// By how much the azimuth turns on [from, to], below the horizon, where it is less than half a
+// turn: the nadir, opposite to the lobe's axis, is below the surface.
+float azimuth_turn(CosineLight light, PowerCurve curve, float from, float to)
 {
-    const float edges = float(UNIFORM_EDGES);
-    int last = int(ceil(to * edges));
-    for (int i = int(floor(from * edges)); i < last; ++i) {
-        add_chord(light, curve, max(float(i) / edges, from), min(float(i + 1) / edges, to), sum);
-    }
+    vec2 a = point_at(light, curve_point(curve, from)).xy;
+    vec2 b = point_at(light, curve_point(curve, to)).xy;
+    float cross_z = a.x * b.y - a.y * b.x;
+    float angle = positive_atan2(abs(cross_z), dot(a, b));
+    return cross_z < 0.0 ? -angle : angle;
 }
-
-#else
 
 // The paper's N_div.
 const int FIRST_INTERVALS = 4;
@@ -62,44 +56,37 @@ float specular_triangle(float alpha)
     return max(0.1 * alpha * alpha, 1e-6);
 }
 
-void add_chords(CosineLight light, PowerCurve curve, float from, float to, inout ContourSum sum)
+float chord_sum(CosineLight light, PowerCurve curve, float from, float to)
 {
-    float area_weight = light.u_cross_v.z * light.pin;
+    float sum = 0.0;
     int level = 0;
     int index = 0;
     while (level > 0 || index < FIRST_INTERVALS) {
         float width = (to - from) / float(FIRST_INTERVALS << level);
         vec3 t = from + width * (vec3(0.0, 0.5, 1.0) + float(index));
-        ContourSum halves = ContourSum(0.0, 0.0, 0.0);
-        add_chord(light, curve, t.x, t.y, halves);
-        add_chord(light, curve, t.y, t.z, halves);
-        ContourSum triangle = halves;
-        add_chord(light, curve, t.z, t.x, triangle);
-        float size = 0.159154943 * abs(triangle.angle + triangle.area * area_weight);
-        if (size >= least_triangle && level < MOST_LEVELS) {
+        float halves = chord_angle(light, curve, t.x, t.y) + chord_angle(light, curve, t.y, t.z);
+        float triangle = halves + chord_angle(light, curve, t.z, t.x);
+        if (0.159154943 * abs(triangle) >= least_triangle && level < MOST_LEVELS) {
             ++level;
             index *= 2;
             continue;
         }
-        sum.angle += halves.angle;
-        sum.area += halves.area;
 #if CURVE_RULE == 2
         // Arc less chord falls by four when an arc is halved.
-        sum.angle += triangle.angle / 3.0;
-        sum.area += triangle.area / 3.0;
+        halves += triangle / 3.0;
 #endif
+        sum += halves;
         ++index;
         while (level > 0 && (index & 1) == 0) {
             index >>= 1;
             --level;
         }
     }
+    return sum;
 }
 
-#endif
-
-// The part [from, to] of a curve, clipped at the surface's horizon before: its parts above the
-// cosine's horizon by edges, the azimuth of those below.
+// The part [from, to] of a curve, clipped at the surface's horizon before: edges along its
+// parts above the cosine's horizon, the azimuth of those below.
 void add_divided_curve(
     CosineLight light, PlanarCurve planar, float from, float to, inout ContourSum sum)
 {
@@ -109,23 +96,15 @@ void add_divided_curve(
     vec4 z = start + vec4(0.0, dot(rise, planar.a_handle),
                           dot(rise, planar.d + planar.b_handle), dot(rise, planar.d));
     sum.top = max(sum.top, max(max(z.x, z.y), max(z.z, z.w)));
-    if (light.pin > 0.0) {
-        add_chords(light, curve, from, to, sum);
-        return;
-    }
     bool above = bernstein(z, from) > 0.0;
     float at = from;
     // A cubic crosses the horizon three times at most.
     for (int i = 0; i < 4; ++i) {
         float next = next_crossing(z, at, to, above);
         if (above) {
-            add_chords(light, curve, at, next, sum);
+            sum.angle += chord_sum(light, curve, at, next);
         } else {
-            vec2 p = curve_point(curve, at);
-            vec2 q = curve_point(curve, next);
-            sum.angle += azimuth_between(
-                light.center.xy + p.x * light.u.xy + p.y * light.v.xy,
-                light.center.xy + q.x * light.u.xy + q.y * light.v.xy);
+            sum.angle += azimuth_turn(light, curve, at, next);
         }
         if (next >= to) {
             break;

@@ -39,13 +39,13 @@ vec2 light_form_factors(PlanarLight light, SurfacePoint point, CosineTransform s
     float winding = light_winding(view);
     vec2 factors = vec2(0.0);
 #if HAS_SPECULAR
-#if CURVE_RULE == 1 || CURVE_RULE == 2
+#if CURVE_RULE
     least_triangle = specular_triangle(point.alpha);
 #endif
     factors.x = clamp(winding * light_form_factor(light, specular, view, normal), 0.0, 1.0);
 #endif
 #if HAS_DIFFUSE
-#if CURVE_RULE == 1 || CURVE_RULE == 2
+#if CURVE_RULE
     least_triangle = DIFFUSE_TRIANGLE;
 #endif
     mat3 shading_from_world = transpose(world_from_shading);

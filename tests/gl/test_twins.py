@@ -55,8 +55,10 @@ THROUGH_PROBE = "a stage of the integral, tested whole by test_probe.py"
 THROUGH_CURVES = "a stage of the integral along curves, tested whole by test_curves.py"
 THROUGH_ADAPTIVE = "a stage of the published methods, tested whole by test_adaptive.py"
 GPU_ONLY = {
-    "add_chord": THROUGH_ADAPTIVE,
-    "add_chords": THROUGH_ADAPTIVE,
+    "point_at": THROUGH_ADAPTIVE,
+    "chord_angle": THROUGH_ADAPTIVE,
+    "azimuth_turn": THROUGH_ADAPTIVE,
+    "chord_sum": THROUGH_ADAPTIVE,
     "specular_triangle": THROUGH_ADAPTIVE,
     "add_divided_curve": THROUGH_ADAPTIVE,
     "power_curve": THROUGH_CURVES,
