@@ -236,7 +236,7 @@ def scenes(draw: st.DrawFn) -> Scene:
     )
 
 
-@settings(max_examples=80)
+@settings(max_examples=50)
 @given(scenes())
 def test_text_round_trip_is_exact(scene: Scene) -> None:
     for base in (None, Path("/meshes/scenes"), Path("/")):
