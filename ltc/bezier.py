@@ -468,10 +468,13 @@ def _quotient(over: FloatArray, under: FloatArray) -> FloatArray:
     return out
 
 
-def _speed(curves: FloatArray) -> FloatArray:
-    """Return an upper bound (m) of |r'|."""
-    legs = np.diff(curves, axis=-2)
-    return np.asarray(3.0 * np.sqrt(np.max(_square(legs), axis=-1)))
+def _reach(curves: FloatArray, m: FloatArray, half: FloatArray) -> FloatArray:
+    """Return the square of how far curves (p, 4, 3) get from their points at m within +- half.
+
+    An upper bound, of the part's control points: it shrinks with the velocity at a cusp.
+    """
+    offset = part(curves, m - half, m + half) - evaluate(curves, m)[:, None]
+    return np.asarray(np.max(_square(offset), axis=-1))
 
 
 _NODES = 16
@@ -519,11 +522,11 @@ def _integrate(
 
 def _by_quadrature(curves: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
     """Return (integrals of the form (m), error estimates (m)) of curves (m, 4, 3)."""
-    speed = _speed(curves)
 
     def short(i: IntArray, m: FloatArray, half: FloatArray) -> BoolArray:
         # Within half its distance from the origin a panel has no pole near.
-        return np.asarray((speed[i] * half) ** 2 <= 0.25 * _square(evaluate(curves[i], m)))
+        c = curves[i]
+        return np.asarray(_reach(c, m, half) <= 0.25 * _square(evaluate(c, m)))
 
     def form(i: IntArray, t: FloatArray) -> FloatArray:
         c = curves[i, None]
@@ -653,19 +656,23 @@ def azimuth_form_factor(contours: Sequence[npt.ArrayLike], tolerance: float = 1e
     """Return `form_factor` from whole contours, without crossings: the form with max(z, 0).
 
     Slower, and for tests: it has no roots of z and no horizon in common with the others.
+    Undefined where an outline passes through the nadir itself.
     """
     curves, light, shape = _flat(contours)
     n, m = int(np.prod(shape)), curves.shape[0]
-    speed = _speed(curves)
+    # On the z axis itself there is no azimuth to speak of.
+    axis = np.all(np.abs(curves[..., :2]) <= 1e-12 * np.abs(curves[..., 2:]), axis=(-2, -1))
+    curves = np.where(axis[:, None, None], 0.0, curves)
 
     def square(r: FloatArray) -> FloatArray:
         return np.asarray(r[..., 0] ** 2 + r[..., 1] ** 2 + np.maximum(r[..., 2], 0.0) ** 2)
 
     def short(i: IntArray, t: FloatArray, half: FloatArray) -> BoolArray:
         # The second derivative jumps where z changes sign, so such panels must be tiny.
-        before, after = (evaluate(curves[i], t + side * half)[:, 2] > 0.0 for side in (-1.0, 1.0))
-        reach = np.where(before == after, 0.5, 1e-5)
-        return np.asarray((speed[i] * half) ** 2 <= reach**2 * square(evaluate(curves[i], t)))
+        c = curves[i]
+        before, after = (evaluate(c, t + side * half)[:, 2] > 0.0 for side in (-1.0, 1.0))
+        limit = np.where(before == after, 0.5, 1e-5)
+        return np.asarray(_reach(c, t, half) <= limit**2 * square(evaluate(c, t)))
 
     def form(i: IntArray, t: FloatArray) -> FloatArray:
         c = curves[i, None]

@@ -642,8 +642,8 @@ class _Cubics(NamedTuple):
         ddr = 6.0 * ((1.0 - m)[:, None] * bend[:, 0] + m[:, None] * bend[:, 1])
         # r = |r| o, differentiated twice.
         ddo = ddr - o * (_dot(do, dr) + _dot(o, ddr))[:, None] - 2.0 * do * _dot(o, dr)[:, None]
-        legs = np.diff(curves, axis=-2)
-        reach = 3.0 * half * np.sqrt(np.max(_dot(legs, legs), axis=-1))
+        offset = bezier.part(curves, m - half, m + half) - r[:, None]
+        reach = np.sqrt(np.max(_dot(offset, offset), axis=-1))
         return reach <= 0.5 * distance[:, 0], ddo / distance
 
     def chords(self) -> tuple[IntArray, FloatArray, FloatArray]:
