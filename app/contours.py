@@ -132,6 +132,20 @@ def anchor_of(contour: BezierContour, segment: int, which: int) -> int:
     return segment if which == 1 else (segment + 1) % len(contour.curves)
 
 
+def handle_to_pull(contour: Contour, index: int) -> tuple[int, int] | None:
+    """Return the handle (segment, which) of an anchor that is not to be seen, None if both are.
+
+    It lies on the anchor, or belongs to a straight segment. The one ahead comes first.
+    """
+    if isinstance(contour, PolygonContour):
+        return None
+    straight = straight_segments(contour)
+    for segment, which in ((index, 1), ((index - 1) % len(contour.curves), 2)):
+        if straight[segment] or handle_of(contour, segment, which) == contour.anchors[index]:
+            return segment, which
+    return None
+
+
 def point_at(contour: Contour, segment: int, along: float) -> Vec2:
     """Return the place at the parameter ``along`` in [0, 1] of a segment."""
     if isinstance(contour, PolygonContour):

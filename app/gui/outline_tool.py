@@ -31,8 +31,9 @@ KIND_KEYS: dict[AnchorKind, Action] = {
 class Drag:
     """What is under the pointer: the light before, the item, where in it the pointer took hold.
 
-    A middle of a segment is dragged as the vertex that was added there; ``item``
-    is what was pressed, ``grip`` what moves.
+    A middle of a segment is dragged as the vertex that was added there, and with
+    Shift an anchor as a handle that lay on it; ``item`` is what was pressed,
+    ``grip`` what moves.
     """
 
     light: int
@@ -144,6 +145,11 @@ class OutlineTool:
         index, contour = editor.selection.index, light.outline.contours[grip.contour]
         word, vertex, item = lights.word_for_vertex(contour), grip.index, grip.name
         name = {"vertex": f"Move {word} of", "handle": "Move handle of", "edge": f"Add {word} to"}
+        pulled = None
+        if grip.what == "vertex" and imgui.get_io().key_shift:
+            pulled = contours.handle_to_pull(contour, grip.index)
+        if pulled is not None:
+            grip = Grip("handle", grip.contour, pulled[0], grip.at, pulled[1])
         editor.begin(f"{name[grip.what]} '{light.name}'")
         if grip.what == "edge":
             light = lights.add_vertex(light, grip.contour, grip.index)
@@ -276,7 +282,7 @@ class OutlineTool:
         imgui.separator()
         curved = isinstance(light.outline.contours[contour], BezierContour)
         if imgui.menu_item_simple("Reverse outline", key_of("reverse")):
-            self._reshape(editor, "Reverse", lambda x: lights.reverse_contour(x, contour))
+            self._reverse(editor, light, contour)
         if not curved and imgui.menu_item_simple("Convert to curves"):
             self._reshape(editor, "Convert", lambda x: lights.to_bezier(x, contour))
         if curved and imgui.begin_menu("Convert to polygon"):
@@ -314,6 +320,11 @@ class OutlineTool:
         if light is None:
             return
         chosen = [vertex[0]] if vertex is not None else range(len(light.outline.contours))
+        self._reverse(editor, light, *chosen)
+
+    def _reverse(self, editor: Editor, light: AreaLight, *chosen: int) -> None:
+        """Let contours wind the other way; the selected vertex stays the same place."""
+        old = editor.selection.vertex
 
         def turned(light: AreaLight) -> AreaLight:
             for contour in chosen:
@@ -321,6 +332,10 @@ class OutlineTool:
             return light
 
         self._reshape(editor, "Reverse", turned)
+        if old is not None and old[0] in chosen:
+            count = contours.size_of(light.outline.contours[old[0]])
+            place = (old[0], -old[1] % count)
+            editor.selection = Selection.light(editor.selection.index, place)
 
     def _at_selected(
         self, editor: Editor, name: str, change: Callable[[AreaLight, int, int], AreaLight]

@@ -59,6 +59,8 @@ def source_rows(
         new, again = _drawing_rows(source, ask_file)
     kind = "text" if isinstance(source, TextSource) else "drawing"
     hint(f"Editing the shape itself makes it a shape like any other, without the {kind}.")
+    if isinstance(new, TextSource) and not new.text.strip():
+        return light, None  # on the way to another text
     if again or new != source:
         if not again and new == replace(source, size=new.size):
             return resized(light, new.size), None

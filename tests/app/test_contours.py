@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import replace
 
@@ -212,6 +213,15 @@ def test_handles_that_lie_on_their_anchor_are_pulled_out() -> None:
     assert bend_at(pulled, 1) < 1e-9
 
 
+def test_a_handle_that_is_not_seen_can_be_pulled() -> None:
+    assert contours.handle_to_pull(SQUARE, 0) is None
+    assert contours.handle_to_pull(HEART, 0) is None
+    assert contours.handle_to_pull(contours.retract_handle(HEART, 1, 1), 1) == (1, 1)
+    assert contours.handle_to_pull(contours.retract_handle(HEART, 0, 2), 1) == (0, 2)
+    assert contours.handle_to_pull(contours.straighten(HEART, 0), 1) == (0, 2)
+    assert contours.handle_to_pull(contours.to_bezier(SQUARE), 0) == (0, 1)
+
+
 # --- adding and removing ----------------------------------------------------
 
 
@@ -354,6 +364,64 @@ def test_a_polygon_becomes_curves_and_comes_back() -> None:
     assert contours.straight_segments(chain).all()
     assert contours.to_polygon(chain, 1e-3) == SQUARE
     assert contours.to_bezier(chain) is chain
+
+
+STIFF: tuple[Contour, ...] = (
+    BezierContour((((0.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (0.0, 0.0)),)),  # a teardrop
+    BezierContour((((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)),)),  # a point
+    contours.to_bezier(PolygonContour(((0.0, 0.0), (0.0, 0.0), (1.0, 0.0), (1.0, 0.0)))),
+    BezierContour(  # handles on their anchors, and collinear ones that turn back
+        (
+            ((0.0, 0.0), (0.0, 0.0), (1.0, 0.0), (1.0, 0.0)),
+            ((1.0, 0.0), (3.0, 0.0), (-2.0, 0.0), (0.5, 0.0)),
+            ((0.5, 0.0), (0.5, 1.0), (0.0, 0.0), (0.0, 0.0)),
+        ),
+        ("symmetric", "smooth", "smooth"),
+    ),
+)
+
+
+def random_edit(contour: Contour, rng: np.random.Generator) -> Contour:
+    """Do anything that can be done to a contour."""
+    count = contours.size_of(contour)
+    i, to = int(rng.integers(count)), tuple(rng.normal(0.0, 1.0, 2).tolist())
+    kind: AnchorKind = ("corner", "smooth", "symmetric")[int(rng.integers(3))]  # type: ignore[assignment]
+    handled = contours.to_bezier(contour)
+    edits = (
+        lambda: contours.move_point(contour, i, to, SKEW),
+        lambda: contours.move_handle(handled, i, 1, to, metric=SKEW),
+        lambda: contours.move_handle(handled, i, 2, to, free=True),
+        lambda: contours.move_handle(handled, i, 2, handled.anchors[(i + 1) % count]),
+        lambda: contours.set_kind(contour, i, kind, SKEW),
+        lambda: contours.insert(contour, i, float(rng.random())),
+        lambda: contours.remove(contour, i) or contour,
+        lambda: contours.straighten(contour, i),
+        lambda: contours.bend(contour, i),
+        lambda: contours.reverse(contour),
+        lambda: contours.mirror(contour),
+        lambda: contours.split(contour, i, (i + 2) % count)[0],
+        lambda: contours.to_polygon(contour, 0.05),
+    )
+    return edits[int(rng.integers(len(edits)))]()
+
+
+@pytest.mark.parametrize("start", [SQUARE, HEART, *STIFF])
+def test_any_row_of_edits_leaves_a_contour(start: Contour) -> None:
+    """`BezierContour` itself refuses numbers that are not finite, and gaps."""
+    rng = np.random.default_rng(41)
+    for _ in range(4):
+        contour = start
+        for _ in range(60):
+            with contextlib.suppress(SceneError):
+                contour = random_edit(contour, rng)
+            if contours.size_of(contour) > 60:
+                break
+            low, high = np.array(contours.bounds(Outline((contour,))))
+            distance, segment, along = contours.nearest(contour, (0.3, -0.2), SKEW)
+            assert (low <= high).all()
+            assert distance >= 0.0
+            assert 0 <= segment < contours.size_of(contour)
+            assert 0.0 <= along <= 1.0
 
 
 # --- in a light -------------------------------------------------------------
