@@ -227,6 +227,29 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
 // err to the same side, and nothing is added for what lies between.
 const float GGX_CHORD_ERROR = 1e-5;
 
+// Chords of a curve are 2^-10 of it at least.
+const int MOST_CHORD_HALVINGS = 10;
+
+// The chord of the piece of a leaf where the walk is. `scale`: the share of the leaf that pieces
+// of this size are.
+PlanarEdge piece_chord(PlanarEdge whole, PowerCurve curve, int piece, float scale)
+{
+    float from = scale * float(piece);
+    float to = scale * float(piece + 1);
+    PlanarEdge edge;
+    // `precise`: what ends here and what starts here must agree to the bit.
+    precise vec2 a = curve_point(curve, from);
+    precise vec2 b = curve_point(curve, to);
+    edge.a = piece == 0 ? whole.a : a;
+    edge.b = to == 1.0 ? whole.b : b;
+    // b - a, without its cancellation.
+    float h = to - from;
+    edge.d = h * (curve.c1 + (to + from) * curve.c2 +
+                  (to * to + to * from + from * from) * curve.c3);
+    edge.moment = cross_2d(edge.a, edge.d);
+    return edge;
+}
+
 // Upper bound of the lobe's integral over an area [m^2] inside a disc (center, radius) about
 // the light's origin: GGX's density |h|^4 / (2 pi ax ay (|bent| + bent.z) |h'|^4), h = v + o,
 // times depth / distance^3.

@@ -28,7 +28,7 @@ SurfacePoint surface_point(vec3 position, vec3 normal, vec3 wo, vec2 alpha)
 
 // Specular and diffuse form factors of a light at a point; both zero where it
 // shows its dark side.
-vec2 light_form_factors(PlanarLight light, SurfacePoint point, CosineTransform specular)
+vec2 form_factors_at(PlanarLight light, SurfacePoint point, CosineTransform specular)
 {
     mat3 world_from_shading = point.frame.world_from_shading;
     vec3 normal = world_from_shading[2];
@@ -36,23 +36,28 @@ vec2 light_form_factors(PlanarLight light, SurfacePoint point, CosineTransform s
     if (is_unseen(light, view, normal)) {
         return vec2(0.0);
     }
-    float winding = light_winding(view);
     vec2 factors = vec2(0.0);
+#if HAS_DIFFUSE
+    mat3 shading_from_world = transpose(world_from_shading);
+    CosineTransform diffuse = CosineTransform(shading_from_world, shading_from_world);
+#endif
+#if HAS_CURVES && HAS_SPECULAR && HAS_DIFFUSE && !CURVE_RULE
+    factors = light_form_factors(light, specular, diffuse, view, normal);
+#else
 #if HAS_SPECULAR
 #if CURVE_RULE
     least_triangle = specular_triangle(point.alpha);
 #endif
-    factors.x = clamp(winding * light_form_factor(light, specular, view, normal), 0.0, 1.0);
+    factors.x = light_form_factor(light, specular, view, normal);
 #endif
 #if HAS_DIFFUSE
 #if CURVE_RULE
     least_triangle = DIFFUSE_TRIANGLE;
 #endif
-    mat3 shading_from_world = transpose(world_from_shading);
-    CosineTransform diffuse = CosineTransform(shading_from_world, shading_from_world);
-    factors.y = clamp(winding * light_form_factor(light, diffuse, view, normal), 0.0, 1.0);
+    factors.y = light_form_factor(light, diffuse, view, normal);
 #endif
-    return factors;
+#endif
+    return clamp(light_winding(view) * factors, 0.0, 1.0);
 }
 
 #if HAS_SPECULAR
@@ -97,7 +102,7 @@ vec3 shade_lights(
     vec3 radiance = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
-        vec2 factors = light_form_factors(light, point, specular);
+        vec2 factors = form_factors_at(light, point, specular);
         radiance += light.radiance * (reflectance * factors.x + material.diffuse * factors.y);
     }
     return radiance;
@@ -116,7 +121,7 @@ void probe_lights(
     diffuse = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
-        vec2 factors = light_form_factors(light, point, lobe.transform);
+        vec2 factors = form_factors_at(light, point, lobe.transform);
         specular += light.radiance * (lobe.albedo.x * factors.x);
         diffuse += light.radiance * factors.y;
     }

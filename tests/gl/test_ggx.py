@@ -64,6 +64,7 @@ GPU_ONLY = {
     "ggx_light_specular": STAGE,
     "ggx_integral_bound": STAGE,
     "ggx_contour_edge": STAGE,
+    "piece_chord": STAGE,
     "ggx_terms": STAGE,
 }
 

@@ -72,11 +72,12 @@ GPU_ONLY = {
     "curve_integral": THROUGH_CURVES,
     "add_curve": THROUGH_CURVES,
     "lobe_density": THROUGH_CURVES,
-    "sliver_integral": THROUGH_CURVES,
+    "sliver_of": THROUGH_CURVES,
+    "is_chord_enough": THROUGH_CURVES,
+    "add_part": THROUGH_CURVES,
     "contour_node": THROUGH_CURVES,
     "node_chord": THROUGH_CURVES,
     "contour_part": THROUGH_CURVES,
-    "piece_chord": THROUGH_CURVES,
     "closing_edge": THROUGH_PROBE,
     "meet_horizon": THROUGH_PROBE,
     "height_of": THROUGH_PROBE,
@@ -92,7 +93,8 @@ GPU_ONLY = {
     "contour_ends": THROUGH_PROBE,
     "contour_edge": THROUGH_PROBE,
     "light_form_factor": THROUGH_PROBE,
-    "light_form_factors": THROUGH_PROBE,
+    "light_form_factors": THROUGH_CURVES,
+    "form_factors_at": THROUGH_PROBE,
     "shows_nothing": THROUGH_PROBE,
     "is_unseen": THROUGH_PROBE,
     "light_winding": THROUGH_PROBE,
@@ -434,6 +436,6 @@ def test_sliver_area(glsl):
     handles, d = f32(rng.normal(size=(COUNT, 4))), f32(rng.normal(size=(COUNT, 2)))
     zero = np.zeros_like(d)
     curves = np.stack([zero, handles[:, :2], d + handles[:, 2:], d], axis=1)
-    got = glsl("ltc/contour.glsl", "result.x = sliver_area(handles, d);",
+    got = glsl("ltc/tree.glsl", "result.x = sliver_area(handles, d);",
                {"handles": handles, "d": d})[:, 0]  # fmt: skip
     np.testing.assert_allclose(got, signed_areas(curves), atol=3e-6)
