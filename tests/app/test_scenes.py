@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from app.meshes import load_mesh
-from app.outline import resolve
-from app.scene import BUILT_IN_MESHES, Scene
+from app.outline import boundary, resolve
+from app.scene import BUILT_IN_MESHES, BezierContour, Scene, SvgSource, TextSource
 from app.scene_io import demo_scenes, load_scene, save_scene, scene_to_json
+from app.sources import outline_from
 from ltc.resources import resource_path
 
 DEMOS = demo_scenes()
@@ -31,6 +32,8 @@ def test_there_are_enough() -> None:
         "quad",
         "ngon-40",
         "star-10",
+        "letter-16-curves",
+        "ring-08-curves",
     }
 
 
@@ -53,6 +56,21 @@ def test_scene_loads_and_nothing_in_it_is_empty(name: str) -> None:
         assert max(light.radiance) > 0.0, light.name
     used = {item.material for item in scene.objects}
     assert used == {material.name for material in scene.materials}, "a material is not used"
+
+
+def test_outlines_are_what_their_sources_make() -> None:
+    """So that editing a text or a drawing's file changes only what was edited."""
+    made = [light for path in DEMOS.values() for light in load_scene(path).lights if light.source]
+    assert {type(light.source) for light in made} == {TextSource, SvgSource}
+    for light in made:
+        assert light.source
+        remade = outline_from(light.source)
+        assert remade.fill_rule == light.outline.fill_rule
+        for now, kept in zip(remade.contours, light.outline.contours, strict=True):
+            assert isinstance(now, BezierContour)
+            assert isinstance(kept, BezierContour)
+            # Processors round differently.
+            np.testing.assert_allclose(now.curves, kept.curves, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -90,6 +108,10 @@ def test_bench_scenes_have_the_edges_that_their_names_say() -> None:
     assert edges["ngon-40"] == [40]
     for count in (8, 32):
         assert edges[f"lights-{count:02}"] == [4] * count
+    for name, count in (("ring-08-curves", 8), ("letter-16-curves", 16)):
+        (light,) = load_scene(BENCHES[name]).lights
+        curves = np.concatenate(boundary(light.outline))
+        assert len(curves) == count
 
 
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
