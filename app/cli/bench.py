@@ -1,4 +1,10 @@
-"""``ltc-viewer bench``: how long the passes take, by scene and technique."""
+"""``ltc-viewer bench``: how long the passes take, by scene and technique, and how much they err.
+
+Errors are those of the integration alone: at random pixels' surface points every technique
+is compared with the limit that it approximates, the lobe of ``ltc`` integrated in float64
+along the very curves (`app.render.truth`). For ``ggx`` that is another lobe, so
+it has none here.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 from rich.table import Table
 
 from app.cli.common import (
@@ -26,9 +33,11 @@ from app.cli.common import (
     results,
     whole_number,
 )
+from app.errors import InputError
 from app.files import check_output, replace_file
-from app.render.techniques import AUTOMATIC, suited_technique, technique_of
-from app.scene import RenderSettings, Scene, Shot
+from app.render.techniques import AUTOMATIC, parse_technique, suited_technique, technique_of
+from app.render.truth import exact_radiance
+from app.scene import ALPHA_MIN, Material, RenderSettings, Scene, Shot
 
 if TYPE_CHECKING:
     import moderngl
@@ -39,6 +48,11 @@ BASELINE = "no shading"
 """The row whose materials reflect nothing: what the passes cost without the integrals."""
 
 MAX_REPEATS = 100_000
+MAX_POINTS = 100_000
+WIDEST = 240
+"""Characters of a table that goes to a file: all columns with errors, unfolded."""
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -57,13 +71,45 @@ class Quartiles:
 
 
 @dataclass(frozen=True)
+class Errors:
+    """Absolute errors at ``points`` pixels, of lights with radiance 1 on a white material."""
+
+    mean: float
+    p95: float
+    max: float
+    points: int
+
+    @classmethod
+    def of(cls, found: NDArray[np.float32], truth: FloatArray) -> Errors:
+        errors = np.abs(found.astype(np.float64) - truth).max(axis=1)
+        p95 = float(np.quantile(errors, 0.95))
+        return cls(float(errors.mean()), p95, float(errors.max()), len(errors))
+
+
+@dataclass(frozen=True)
 class Row:
-    """One measured shot: ``passes`` by name, and ``wall``, the whole frame with a glFinish."""
+    """One measured shot: ``passes`` by name, and ``wall``, the whole frame with a glFinish.
+
+    ``alpha`` is what all materials were given, None where they keep their own; ``errors``
+    are those of the two lobes, empty where none were asked for or there is no truth.
+    """
 
     scene: str
     technique: str
+    alpha: float | None
     passes: dict[str, Quartiles]
     wall: Quartiles
+    errors: dict[str, Errors]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A shot to measure, and how its row is labelled."""
+
+    scene: str
+    technique: str
+    alpha: float | None
+    shot: Shot
 
 
 def bench(
@@ -91,6 +137,25 @@ def bench(
             parser=whole_number("--warm-up", 0, MAX_REPEATS),
         ),
     ] = 5,
+    alphas: Annotated[
+        list[float],
+        typer.Option(
+            "--alpha",
+            metavar="A",
+            help="Give all materials this GGX alpha; repeat for several.",
+            show_default="their own",
+        ),
+    ] = [],  # noqa: B006 (typer copies it)
+    points: Annotated[
+        int,
+        typer.Option(
+            "--error",
+            metavar="N",
+            help="Compare N random pixels with the exact integral.",
+            parser=whole_number("--error", 0, MAX_POINTS),
+            show_default=False,
+        ),
+    ] = 0,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON too.")
     ] = None,
@@ -102,28 +167,42 @@ def bench(
     table says so. The row "no shading" shows the scene with materials that
     reflect nothing: what remains when the integrals are left out.
 
+    --error adds how far each technique is from the integral that it approximates:
+    mean, 95th percentile and largest error of specular and diffuse radiance, of
+    lights with radiance 1 on a white material.
+
     \b
-    Example:
+    Examples:
       ltc-viewer bench quad.json star.json --technique ltc --size 1920x1080 --json times.json
+      ltc-viewer bench disk.json --technique ltc --technique uniform:30 --alpha 0.01 --error 2000
     """
     width, height = image_size(size)
     for technique in techniques:
         suited_technique(technique, anisotropic=False)
+    for alpha in alphas:
+        if not ALPHA_MIN <= alpha <= 1.0:
+            raise InputError(f"--alpha is {alpha:g}, expected a number between {ALPHA_MIN:g} and 1")
     if json_file is not None:
         check_output(json_file, "a table of figures", (".json",))
     loaded = [(name, named_scene(name)) for name in scenes]
-    shots = list(_shots(loaded, techniques, width, height))
+    jobs = list(_jobs(loaded, techniques, alphas, width, height))
     with headless_renderer() as (ctx, renderer):
         device = str(ctx.info["GL_RENDERER"])
         if is_software(device):
             renderer.use_wall_clock()
         rows = []
-        with Steps("measuring", len(shots) * (warm_up + repeats)) as steps:
-            for name, technique, shot in shots:
-                rows.append(_measure(ctx, renderer, name, technique, shot, warm_up, repeats, steps))
+        exact = Exact(renderer, points)
+        with Steps("measuring", len(jobs) * (warm_up + repeats)) as steps:
+            for job in jobs:
+                passes, wall = _measure(ctx, renderer, job.shot, warm_up, repeats, steps)
+                errors = exact.errors(job) if points and job.technique != BASELINE else {}
+                rows.append(Row(job.scene, job.technique, job.alpha, passes, wall, errors))
         source = renderer.timing_source
         version = str(ctx.info["GL_VERSION"])
-    results().print(_table(rows, f"{device}, {width}x{height}, by {source}"))
+    console = results()
+    if not console.is_terminal:
+        console.width = WIDEST
+    console.print(_table(rows, f"{device}, {width}x{height}, by {source}"))
     if source == "wall clock":
         messages().print(
             "Times are by the wall clock, each pass ending with glFinish: this renderer's timer "
@@ -145,32 +224,94 @@ def bench(
         replace_file(json_file, text.encode("utf-8"), "a table of figures")
 
 
-def _shots(
-    scenes: list[tuple[str, Scene]], techniques: list[str], width: int, height: int
-) -> Iterator[tuple[str, str, Shot]]:
-    """Yield each scene's baseline, then its techniques."""
+def _jobs(
+    scenes: list[tuple[str, Scene]],
+    techniques: list[str],
+    alphas: list[float],
+    width: int,
+    height: int,
+) -> Iterator[Job]:
+    """Yield each scene's baseline, then for each alpha its techniques."""
     for name, scene in scenes:
-        black = tuple(
-            replace(material, diffuse=(0.0, 0.0, 0.0), f0=(0.0, 0.0, 0.0))
-            for material in scene.materials
-        )
+        black = _with_materials(scene, diffuse=(0.0, 0.0, 0.0), f0=(0.0, 0.0, 0.0))
         first = RenderSettings(technique=techniques[0])
-        yield name, BASELINE, Shot(replace(scene, materials=black), first, width, height)
-        for technique in techniques:
-            own = technique_of(scene, technique)
-            yield name, own, Shot(scene, RenderSettings(technique=own), width, height)
+        yield Job(name, BASELINE, None, Shot(black, first, width, height))
+        choices: list[float | None] = [*alphas] if alphas else [None]
+        for alpha in choices:
+            glossy = scene if alpha is None else _with_materials(scene, alpha=(alpha, alpha))
+            for technique in techniques:
+                own = technique_of(glossy, technique)
+                label = own if technique == AUTOMATIC else technique
+                yield Job(
+                    name, label, alpha, Shot(glossy, RenderSettings(technique=own), width, height)
+                )
+
+
+def _with_materials(scene: Scene, **changes: Any) -> Scene:
+    materials: tuple[Material, ...] = tuple(replace(m, **changes) for m in scene.materials)
+    return replace(scene, materials=materials)
+
+
+class Exact:
+    """The truth at random pixels of a scene, computed once for all techniques."""
+
+    def __init__(self, renderer: Renderer, points: int) -> None:
+        self._renderer = renderer
+        self._points = points
+        self._scene: Scene | None = None
+        self._inputs: dict[str, FloatArray] = {}
+        self._truth: dict[str, FloatArray] = {}
+
+    def errors(self, job: Job) -> dict[str, Errors]:
+        """Return the errors of the shot that was rendered last; empty where there is no truth."""
+        shot = job.shot
+        if not parse_technique(shot.settings.technique).technique.has_tables:
+            return {}
+        lit = tuple(replace(lamp, radiance=(1.0, 1.0, 1.0)) for lamp in shot.scene.lights
+                    if any(lamp.radiance))  # fmt: skip
+        scene = replace(shot.scene, lights=lit)
+        if scene != self._scene:
+            self._scene = scene
+            self._choose(scene)
+        if not len(self._inputs["position"]):
+            return {}
+        found = self._renderer.probe(scene, shot.settings, **self._inputs)
+        return {name: Errors.of(found[name], truth) for name, truth in self._truth.items()}
+
+    def _choose(self, scene: Scene) -> None:
+        seen = self._renderer.surfaces()
+        rng = np.random.default_rng(0)
+        count = min(self._points, len(seen.index))
+        which = rng.choice(len(seen.index), count, replace=False)
+        materials = scene.object_materials()
+        alpha = np.array([m.alpha for m in materials]).reshape(-1, 2)[seen.index[which]]
+        # Rounded first, so that GPU and truth see the very same points.
+        position, normal, view = (
+            a[which].astype(np.float32).astype(np.float64)
+            for a in (seen.position, seen.normal, seen.view)
+        )
+        alpha = alpha.astype(np.float32).astype(np.float64)
+        self._inputs = {
+            "position": position,
+            "normal": normal,
+            "tangent": np.zeros_like(normal),
+            "view": view,
+            "alpha": alpha,
+        }
+        normal, view = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (normal, view))
+        mean = np.sqrt(alpha[:, 0] * alpha[:, 1])
+        specular, diffuse = exact_radiance(scene.lights, position, normal, view, mean)
+        self._truth = {"specular": specular, "diffuse": diffuse}
 
 
 def _measure(
     ctx: moderngl.Context,
     renderer: Renderer,
-    name: str,
-    technique: str,
     shot: Shot,
     warm_up: int,
     repeats: int,
     steps: Steps,
-) -> Row:
+) -> tuple[dict[str, Quartiles], Quartiles]:
     before = steps.count
     times: dict[str, list[float]] = {}
     wall: list[float] = []
@@ -190,25 +331,32 @@ def _measure(
                 times.setdefault(key, []).append(value)
         steps.done(before + index + 1)
     passes = {key: Quartiles.of(values) for key, values in times.items()}
-    return Row(name, technique, passes, Quartiles.of(wall))
+    return passes, Quartiles.of(wall)
 
 
 def _table(rows: list[Row], title: str) -> Table:
     table = Table(title=f"Milliseconds per frame: median (quartiles). {title}")
     table.add_column("scene")
     table.add_column("technique")
+    has_alpha = any(row.alpha is not None for row in rows)
+    if has_alpha:
+        table.add_column("alpha", justify="right")
     names = list(dict.fromkeys(name for row in rows for name in row.passes))
     for name in (*names, "wall"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("repeats", justify="right")
+    lobes = list(dict.fromkeys(lobe for row in rows for lobe in row.errors))
+    for lobe in lobes:
+        table.add_column(f"{lobe} error: mean, p95, max", justify="right", no_wrap=True)
     for row in rows:
-        cells = [_cell(row.passes.get(name)) for name in names]
         table.add_row(
             Path(row.scene).stem,
             row.technique,
-            *cells,
+            *(["-" if row.alpha is None else f"{row.alpha:g}"] if has_alpha else []),
+            *(_cell(row.passes.get(name)) for name in names),
             _cell(row.wall),
             str(row.wall.repeats),
+            *(_error_cell(row.errors.get(lobe)) for lobe in lobes),
         )
     return table
 
@@ -217,3 +365,9 @@ def _cell(figures: Quartiles | None) -> str:
     if figures is None:
         return "-"
     return f"{figures.median:.3f} ({figures.q1:.3f} to {figures.q3:.3f})"
+
+
+def _error_cell(errors: Errors | None) -> str:
+    if errors is None:
+        return "-"
+    return f"{errors.mean:.1e}, {errors.p95:.1e}, {errors.max:.1e}"

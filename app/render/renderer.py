@@ -41,6 +41,21 @@ class Hit:
     position_ws: tuple[float, float, float]
 
 
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """Points of the objects that a picture shows, one a pixel, pixels with nothing left out.
+
+    ``position``, ``normal`` and ``view``, (n, 3) float64, are as the lighting pass has
+    them: world space, view and normal unit, the normal bent to face the viewer. ``index``,
+    (n,), counts the scene's objects.
+    """
+
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    view: NDArray[np.float64]
+    index: NDArray[np.int64]
+
+
 @dataclass(frozen=True)
 class _Seen:
     """What a G-buffer and its radiance depend on, with parts compared by identity first."""
@@ -308,6 +323,36 @@ class Renderer:
         if identity >= 0:
             return Hit("object", identity, place)
         return Hit("light", -1 - identity, place)
+
+    def surfaces(self) -> Surfaces:
+        """Return the surface points of the sample rendered last, if that was a pixel's centre.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        if self._seen is None or self._needs is None:
+            raise RuntimeError("nothing was rendered yet")
+        shot = self._seen.shot
+        if not self._needs.lighting.lit:
+            none = np.zeros((0, 3))
+            return Surfaces(none, none, none, np.zeros(0, dtype=np.int64))
+        width, height = shot.width, shot.height
+        raw = np.frombuffer(self._targets.texture("gbuffer").read(), dtype=np.float32)
+        pixels = raw.reshape(height, width, 4)[::-1].astype(np.float64)
+        rows, columns = np.nonzero((pixels[..., 2] > 0.0) & (pixels[..., 3] >= 0.0))
+        found = pixels[rows, columns]
+        frame = CameraFrame.of(shot.scene.camera, width / height)
+        x, y = (axis.astype(np.float64) + 0.5 for axis in (columns, rows))
+        ray = frame.ray(x, y, (width, height))
+        view = -ray / np.linalg.norm(ray, axis=-1, keepdims=True)
+        return Surfaces(
+            frame.eye + found[:, 2:3] * ray,
+            facing_normal(direction_from_octahedral(found[:, :2]), view),
+            view,
+            found[:, 3].astype(np.int64),
+        )
 
     def probe(
         self,
@@ -586,6 +631,21 @@ class Renderer:
         if self._seen is None or not self._newest:
             raise RuntimeError("nothing was rendered yet")
         return self._targets.texture(self._newest)
+
+
+def direction_from_octahedral(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the unit vectors (n, 3) of (n, 2), as ``shaders/common/octahedron.glsl``."""
+    z = 1.0 - np.abs(p).sum(axis=-1)
+    folded = (1.0 - np.abs(p[:, ::-1])) * np.where(p < 0.0, -1.0, 1.0)
+    v = np.column_stack([np.where(z[:, None] < 0.0, folded, p), z])
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+
+
+def facing_normal(normal: NDArray[np.float64], wo: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return normals as ``shaders/passes/lighting.frag`` bends them to face the viewer."""
+    missing = np.maximum(1e-4 - np.sum(normal * wo, axis=-1, keepdims=True), 0.0)
+    bent = normal + missing * wo
+    return np.asarray(bent / np.linalg.norm(bent, axis=-1, keepdims=True))
 
 
 def _top_down(texture: moderngl.Texture, dtype: DTypeLike) -> NDArray[Any]:

@@ -420,6 +420,12 @@ CASES: dict[str, Case] = {
     "bench backwards": bad_arguments(
         "bench", "scene.json", "--warm-up", "-1", parts=("--warm-up", "from 0")
     ),
+    "bench at no alpha": bad_arguments(
+        "bench", "scene.json", "--alpha", "0", parts=("--alpha is 0", "between 0.0001 and 1")
+    ),
+    "bench with half a pixel": bad_arguments(
+        "bench", "scene.json", "--error", "0.5", parts=("--error is '0.5'", "from 0")
+    ),
     "bench to text": bad_arguments(
         "bench", "scene.json", "--json", "a.txt", parts=("a.txt", ".json")
     ),

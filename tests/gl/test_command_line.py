@@ -146,6 +146,41 @@ def test_bench(folder: Path) -> None:
             assert 0.0 <= times["q1"] <= times["median"] <= times["q3"]
 
 
+def test_bench_compares_with_the_exact_integral(folder: Path) -> None:
+    """Per alpha and technique; none for ggx, which is another lobe, nor for the baseline."""
+    curved = json.loads((folder / "lit.json").read_text())
+    h = 0.5522847498
+    curved["lights"][0]["outline"] = {"contours": [{"bezier": [
+        [[1, 0], [1, h], [h, 1], [0, 1]], [[0, 1], [-h, 1], [-1, h], [-1, 0]],
+        [[-1, 0], [-1, -h], [-h, -1], [0, -1]], [[0, -1], [h, -1], [1, -h], [1, 0]],
+    ]}]}  # fmt: skip
+    (folder / "disk.json").write_text(json.dumps(curved))
+    techniques = ("ltc", "uniform:4", "uniform:128", "ggx:3")
+    options = [word for name in techniques for word in ("--technique", name)]
+    done = command(
+        folder, "bench", "disk.json", "--size", "64x48", "--repeats", "1", "--warm-up", "0",
+        "--json", "times.json", "--error", "200", "--alpha", "0.1", "--alpha", "0.3", *options,
+    )  # fmt: skip
+    for word in ("specular error: mean, p95, max", "uniform:128", "alpha"):
+        assert word in done.stdout
+    rows = json.loads((folder / "times.json").read_text())["rows"]
+    assert [(row["technique"], row["alpha"]) for row in rows] == [
+        ("no shading", None), *((name, alpha) for alpha in (0.1, 0.3) for name in techniques),
+    ]  # fmt: skip
+    for row in rows:
+        if row["technique"] in ("no shading", "ggx:3"):
+            assert row["errors"] == {}
+            continue
+        for lobe in ("specular", "diffuse"):
+            errors = row["errors"][lobe]
+            assert errors["points"] == 200
+            assert 0.0 <= errors["mean"] <= errors["max"]
+            assert errors["p95"] <= errors["max"]
+        # Four edges a quarter lose 2.6 % of a circle's area, 128 lose 3e-5.
+        specular = row["errors"]["specular"]["max"]
+        assert specular > 2e-3 if row["technique"] == "uniform:4" else specular < 5e-4
+
+
 def test_explain(folder: Path) -> None:
     text = command(folder, "explain", "lit.json", "--size", "640x480").stdout
     for part in ("640x480", "technique ltc", "Programs", "Attachments", "Left out"):
