@@ -22,7 +22,7 @@ from ltc.reference import curve_specular_integral_batch, specular_integral_batch
 
 WIDTH, HEIGHT = 64, 36
 
-CURVED_PIXELS = 100
+CURVED_PIXELS = 200
 """Pixels of a scene with curved lights, which are integrated exactly at a few hundred a second."""
 
 FloatArray = NDArray[np.float64]

@@ -22,7 +22,7 @@ from app.scene_io import demo_scenes, load_scene
 
 EDGES = 4096
 
-SHADED = 32, 18
+SHADED = 64, 36
 """Pixels of the pictures whose shading is compared: thousands of edges cost seconds."""
 
 SEEN = 320, 180
