@@ -127,7 +127,9 @@ class LightNeeds:
 
     def technique(self, wanted: str) -> str:
         """Return whose shaders integrate these lights: ``ltc`` if only curves would differ."""
-        if parse_technique(wanted).follows_ltc and self.curves != "whole":
+        choice = parse_technique(wanted)
+        alike = choice.follows_ltc and self.curves != "whole"
+        if alike or (choice.name == DEFAULT_TECHNIQUE and self.curves != "tree"):
             return DEFAULT_TECHNIQUE
         return wanted
 
@@ -248,6 +250,7 @@ def technique_defines(technique: str) -> dict[str, int]:
     defines = {
         "TECHNIQUE_GGX": int(choice.name == "ggx"),
         "CURVE_RULE": choice.technique.curve_rule,
+        "CURVE_NODES": choice.curve_nodes,
     }
     if choice.name == "ggx" and choice.number is not None:
         defines["GGX_NODES"] = choice.number

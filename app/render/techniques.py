@@ -62,6 +62,7 @@ TECHNIQUES: dict[str, Technique] = {
         "diffuse",
         anisotropic=False,
         has_tables=True,
+        parameter=Parameter("quadrature nodes a panel of a curve", 2, 6, 4),
     ),
     "ggx": Technique(
         "GGX itself as a contour integral in half-vector space, anisotropic, without tables; "
@@ -128,6 +129,14 @@ class Choice(NamedTuple):
     def follows_ltc(self) -> bool:
         """Whether it is ``ltc`` but for how it takes curves."""
         return self.technique.curves != "tree"
+
+    @property
+    def curve_nodes(self) -> int:
+        """Nodes of a panel wherever pieces of the tree are integrated: ``ltc``'s number."""
+        parameter = TECHNIQUES[DEFAULT_TECHNIQUE].parameter
+        assert parameter is not None
+        own = self.number if self.name == DEFAULT_TECHNIQUE else None
+        return parameter.default if own is None else own
 
     def __str__(self) -> str:
         parameter = self.technique.parameter

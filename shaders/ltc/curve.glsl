@@ -4,8 +4,8 @@
 // parameter; how fast Gauss-Legendre converges is decided by the nearest complex root of
 // |r(t)|^2, its pole. Leaves of the tree (app/render/contour_tree.py) turn so little
 // that the pole as seen from a place near it, as if the curve went straight on, is near the
-// true one. A panel that sees a pole nearby from its outer nodes is halved, else its four
-// nodes integrate it. docs/curves.md has the figures, and those of what was tried and left.
+// true one. A panel that sees a pole nearby from its outer nodes is halved, else its
+// CURVE_NODES nodes integrate it, four unless asked otherwise. docs/curves.md has the figures, and those of what was tried and left.
 // Parts below the cosine's horizon are replaced by their azimuth, as with edges, node by node.
 
 #include "ltc/polygon.glsl"
@@ -142,10 +142,25 @@ vec2 nearest_pole(CurveNode node)
            max(dot(node.r_way, node.r_way), 1e-30);
 }
 
-const float NODE_1 = 0.339981043585;
-const float NODE_2 = 0.861136311594;
-const float WEIGHT_1 = 0.652145154863;
-const float WEIGHT_2 = 0.347854845137;
+// Gauss and Legendre's places on [-1, 1] and weights: the outer pair, the next, and the middle.
+// They are literals, because arrays that a loop indexes may end in local memory.
+#if CURVE_NODES == 2
+const vec2 OUTER = vec2(0.577350269190, 1.0);
+#elif CURVE_NODES == 3
+const vec2 OUTER = vec2(0.774596669241, 0.555555555556);
+const float MIDDLE_WEIGHT = 0.888888888889;
+#elif CURVE_NODES == 4
+const vec2 OUTER = vec2(0.861136311594, 0.347854845137);
+const vec2 SECOND = vec2(0.339981043585, 0.652145154863);
+#elif CURVE_NODES == 5
+const vec2 OUTER = vec2(0.906179845939, 0.236926885056);
+const vec2 SECOND = vec2(0.538469310106, 0.478628670499);
+const float MIDDLE_WEIGHT = 0.568888888889;
+#else
+const vec2 OUTER = vec2(0.932469514203, 0.171324492379);
+const vec2 SECOND = vec2(0.661209386466, 0.360761573048);
+const vec2 THIRD = vec2(0.238619186083, 0.467913934573);
+#endif
 
 // Panels are 2^-16 of a curve at least: float32 knows no more of a place on it.
 const int MOST_HALVINGS = 16;
@@ -163,6 +178,15 @@ float pole_ellipse(vec2 pole)
     return length(pole - vec2(1.0, 0.0)) + length(pole + vec2(1.0, 0.0));
 }
 
+// The integrand at two nodes, (place, weight) from the middle.
+float node_pair(
+    CosineLight light, PowerCurve curve, float middle, float half_width, vec2 node)
+{
+    float off = node.x * half_width;
+    return node.y * (curve_form(curve_node(light, curve, middle - off)) +
+                     curve_form(curve_node(light, curve, middle + off)));
+}
+
 // Integral over a part of the curve.
 float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
 {
@@ -173,10 +197,10 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
     // Panels in order: after the second half of one comes the one it is half of.
     while (panel < 1 || halvings > 0) {
         float middle = from + half_width * float(2 * panel + 1);
-        CurveNode first = curve_node(light, curve, middle - NODE_2 * half_width);
-        CurveNode last = curve_node(light, curve, middle + NODE_2 * half_width);
-        vec2 from_first = nearest_pole(first) / half_width - vec2(NODE_2, 0.0);
-        vec2 from_last = nearest_pole(last) / half_width + vec2(NODE_2, 0.0);
+        CurveNode first = curve_node(light, curve, middle - OUTER.x * half_width);
+        CurveNode last = curve_node(light, curve, middle + OUTER.x * half_width);
+        vec2 from_first = nearest_pole(first) / half_width - vec2(OUTER.x, 0.0);
+        vec2 from_last = nearest_pole(last) / half_width + vec2(OUTER.x, 0.0);
         float ellipse = min(pole_ellipse(from_first), pole_ellipse(from_last));
         bool has_kink = (first.r.z > 0.0) != (last.r.z > 0.0);
         if (ellipse < (has_kink ? FAR_FROM_KINK : FAR_POLE) && halvings < MOST_HALVINGS) {
@@ -185,10 +209,17 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
             panel *= 2;
             continue;
         }
-        CurveNode second = curve_node(light, curve, middle - NODE_1 * half_width);
-        CurveNode third = curve_node(light, curve, middle + NODE_1 * half_width);
-        sum += half_width * (WEIGHT_2 * (curve_form(first) + curve_form(last)) +
-                             WEIGHT_1 * (curve_form(second) + curve_form(third)));
+        float panel_sum = OUTER.y * (curve_form(first) + curve_form(last));
+#if CURVE_NODES >= 4
+        panel_sum += node_pair(light, curve, middle, half_width, SECOND);
+#endif
+#if CURVE_NODES == 6
+        panel_sum += node_pair(light, curve, middle, half_width, THIRD);
+#endif
+#if CURVE_NODES == 3 || CURVE_NODES == 5
+        panel_sum += MIDDLE_WEIGHT * curve_form(curve_node(light, curve, middle));
+#endif
+        sum += half_width * panel_sum;
         ++panel;
         while ((panel & 1) == 0 && halvings > 0) {
             panel >>= 1;

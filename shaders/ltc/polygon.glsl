@@ -18,6 +18,7 @@
 //     edge, with no state between edges; where an edge crosses the horizon, the
 //     crossing's direction is w x z.
 
+#include "common/cost.glsl"
 #include "common/light_data.glsl"
 
 // What carries points (directions) and edge planes (their normals) from the world
@@ -240,6 +241,7 @@ void add_near_edge(CosineLight light, PlanarEdge edge, inout ContourSum sum)
     vec3 q = light.center + edge.b.x * light.u + edge.b.y * light.v;
     sum.top = max(sum.top, max(p.z, q.z));
     sum.angle += edge_angle(p, q, edge_plane(light, edge));
+    count_evaluations(1);
 }
 
 void add_edge(CosineLight light, PlanarEdge edge, inout ContourSum sum)
@@ -249,6 +251,7 @@ void add_edge(CosineLight light, PlanarEdge edge, inout ContourSum sum)
     vec3 p = light.center + dp;
     vec3 q = light.center + dq;
     vec3 w = edge_plane(light, edge);
+    count_evaluations(1);
     sum.top = max(sum.top, max(p.z, q.z));
     if (light.pin > 0.0) {
         sum.area += edge.moment;

@@ -15,8 +15,18 @@
 #endif
 
 // Largest radiance that a node's chord may be wrong by, of a light of radiance 1. The bound
-// is far from tight: outlines err by a tenth of this altogether.
+// is far from tight: outlines err by a tenth of this altogether. It goes with the panels' error.
+#if CURVE_NODES == 2
+const float CHORD_ERROR = 1e-3;
+#elif CURVE_NODES == 3
+const float CHORD_ERROR = 3e-4;
+#elif CURVE_NODES == 4
 const float CHORD_ERROR = 1e-4;
+#elif CURVE_NODES == 5
+const float CHORD_ERROR = 3e-5;
+#else
+const float CHORD_ERROR = 1e-5;
+#endif
 
 // The cosine lobe's density over a light's plane [1/m^2]: scale z / |r|^4.
 struct LobeDensity {

@@ -74,6 +74,7 @@ FEATURES = {
     "HAS_ONE_SIDED": 1,
     "HAS_TWO_SIDED": 1,
     "HAS_CURVES": 0,
+    "CURVE_NODES": 4,
     "CURVE_RULE": 0,
     "HAS_EXACT_FMA": 0,
     "PROBES": 1,
