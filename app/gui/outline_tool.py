@@ -17,14 +17,8 @@ from app.editor import Editor, Selection
 from app.gui.grips import Grip, grips_of, is_crowded, nearest_grip, sorted_by_distance
 from app.gui.messages import Messages
 from app.gui.overlays import HANDLE, Canvas, Sight
-from app.gui.shortcuts import Action, key_of
+from app.gui.shortcuts import key_of
 from app.scene import ANCHOR_KINDS, AnchorKind, AreaLight, BezierContour, SceneError, Vec2
-
-KIND_KEYS: dict[AnchorKind, Action] = {
-    "corner": "corner",
-    "smooth": "smooth",
-    "symmetric": "symmetric",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +268,7 @@ class OutlineTool:
 
     def _kind_items(self, editor: Editor, vertex: tuple[int, int], now: AnchorKind) -> None:
         for kind in ANCHOR_KINDS:
-            if imgui.menu_item_simple(kind.capitalize(), key_of(KIND_KEYS[kind]), kind == now):
+            if imgui.menu_item_simple(kind.capitalize(), key_of(kind), kind == now):
                 self._set_kind(editor, vertex, kind)
 
     def _contour_items(self, editor: Editor, light: AreaLight, contour: int) -> None:

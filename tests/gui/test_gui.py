@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE = 300
+PATIENCE = 600
 """Seconds after which the application counts as hanging."""
 
 SCENARIOS = (
