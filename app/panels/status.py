@@ -21,13 +21,11 @@ def help_line(scene: Scene, selection: Selection, tool: str) -> str:
             kinds = f"{key_of('smooth')} smooth, {key_of('corner')} corner"
             return f"Drag anchor and handles, Alt frees one · {kinds} · {removes}"
         return f"Drag the corner · {removes} · drag a dot between corners to add one"
-    if selection.kind == "light" and scene.lights[selection.index].source is not None:
-        what = scene.lights[selection.index].source
-        if isinstance(what, TextSource):
-            return (
-                "Type its text in the Light panel · drop a font on it · come closer for its points"
-            )
-        return "Its drawing is chosen in the Light panel · come closer for its points"
+    source = scene.lights[selection.index].source if selection.kind == "light" else None
+    if isinstance(source, TextSource):
+        return "Type in the Light panel · drop a font file here · drag the arrows to move it"
+    if source is not None:
+        return "Its file and size are in the Light panel · drag the arrows to move it"
     if selection.kind == "light":
         if tool == "move":
             use = f"drag the arrows to move the light · {key_of('rotate')} to rotate"
