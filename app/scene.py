@@ -25,11 +25,13 @@ ToneMap: TypeAlias = Literal["agx", "aces", "reinhard", "none"]
 CubicCurve: TypeAlias = tuple[Vec2, Vec2, Vec2, Vec2]
 TextAlign: TypeAlias = Literal["left", "center", "right"]
 AnchorKind: TypeAlias = Literal["corner", "smooth", "symmetric"]
+PixelView: TypeAlias = Literal["radiance", "cost"]
 
 FILL_RULES: tuple[FillRule, ...] = ("evenodd", "nonzero")
 TONE_MAPS: tuple[ToneMap, ...] = ("agx", "aces", "reinhard", "none")
 ANCHOR_KINDS: tuple[AnchorKind, ...] = ("corner", "smooth", "symmetric")
 TEXT_ALIGNS: tuple[TextAlign, ...] = ("left", "center", "right")
+PIXEL_VIEWS: tuple[PixelView, ...] = ("radiance", "cost")
 BUILT_IN_MESHES = ("plane", "sphere", "disc", "box")
 
 ALPHA_MIN = 1e-4
@@ -387,13 +389,17 @@ class RenderSettings:
 
     Technique ``auto`` is whichever suits the scene (`app.render.techniques`).
 
-    One sample is exactly the pixel centre.
+    One sample is exactly the pixel centre. ``view`` is what a pixel shows: its radiance, or its
+    cost, the number of evaluations of the contour integral that its lights took.
     """
 
     technique: str = "auto"
     samples: int = 1
+    view: PixelView = "radiance"
 
     def __post_init__(self) -> None:
+        if self.view not in PIXEL_VIEWS:
+            raise SceneError(f"view is '{self.view}', expected one of {', '.join(PIXEL_VIEWS)}")
         if not 1 <= self.samples <= MAX_SAMPLES:
             raise SceneError(f"samples is {self.samples}, expected between 1 and {MAX_SAMPLES}")
 

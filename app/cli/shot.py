@@ -18,9 +18,11 @@ from app.cli.common import (
     image_size,
     named_scene,
 )
+from app.errors import InputError, expected_one_of
 from app.images import check_image_path, save_image
+from app.render.cost import WithLegend
 from app.render.techniques import AUTOMATIC, suited_technique
-from app.scene import RenderSettings, Shot
+from app.scene import PIXEL_VIEWS, RenderSettings, Shot
 
 
 def shot(
@@ -32,11 +34,22 @@ def shot(
     size: SizeOption = DEFAULT_SIZE,
     samples: SamplesOption = 16,
     technique: TechniqueOption = AUTOMATIC,
+    view: Annotated[
+        str,
+        typer.Option(
+            "--view",
+            metavar="VIEW",
+            help=f"What pixels show: {' or '.join(PIXEL_VIEWS)}.",
+        ),
+    ] = "radiance",
 ) -> None:
     """Render a scene to a picture, without a window.
 
     A .png holds the display colours, an .exr the linear radiance in float32.
     The file appears only once it is complete; its name goes to stdout.
+
+    --view cost shows how often each pixel evaluated the contour integral, as
+    colours with a legend in a .png, as numbers in an .exr.
 
     \b
     Example:
@@ -45,12 +58,14 @@ def shot(
     width, height = image_size(size)
     suited_technique(technique, anisotropic=False)
     check_image_path(output)
-    settings = RenderSettings(technique=technique, samples=samples)
+    if view not in PIXEL_VIEWS:
+        raise InputError(f"--view is '{view}', {expected_one_of(view, PIXEL_VIEWS)}")
+    settings = RenderSettings(technique, samples, view)
     wanted = Shot(named_scene(scene), settings, width, height)
     with headless_renderer() as (ctx, renderer):
         with Steps("rendering", samples) as steps:
             while (done := renderer.accumulate(wanted, samples)) < samples:
                 ctx.finish()
                 steps.done(done)
-        save_image(renderer, output)
+        save_image(WithLegend(renderer) if view == "cost" else renderer, output)
     typer.echo(output)

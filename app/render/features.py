@@ -28,7 +28,7 @@ from app.render.pack import (
     part_count,
 )
 from app.render.techniques import DEFAULT_TECHNIQUE, find_technique, parse_technique
-from app.scene import AreaLight, Scene
+from app.scene import AreaLight, PixelView, Scene
 
 STORAGE_TEXTURE_WIDTH = 1024
 """Texels in a row of the textures that hold lights or materials too many for a block."""
@@ -167,6 +167,8 @@ class LightingFeatures:
         diffuse reflection is the same in all but those that take curves whole.
     tangents : bool
         Some glossy material is anisotropic, and the technique shades it so.
+    counts : bool
+        Pixels get the number of evaluations instead of radiance.
     """
 
     specular: bool
@@ -177,10 +179,16 @@ class LightingFeatures:
     uniform_materials: int
     technique: str
     tangents: bool
+    counts: bool
 
     @classmethod
     def of(
-        cls, scene: Scene, samples: int, limits: Limits, technique: str = DEFAULT_TECHNIQUE
+        cls,
+        scene: Scene,
+        samples: int,
+        limits: Limits,
+        technique: str = DEFAULT_TECHNIQUE,
+        view: PixelView = "radiance",
     ) -> LightingFeatures:
         """Raise `InputError` if lights or objects are more than the machine can hold."""
         lights = LightNeeds.of(scene.lights, limits, technique)
@@ -208,6 +216,7 @@ class LightingFeatures:
             specular
             and find_technique(technique).anisotropic
             and any(material.is_anisotropic and any(material.f0) for material in used),
+            view == "cost",
         )
 
     @property
@@ -236,6 +245,7 @@ class LightingFeatures:
             "HAS_SHAPES": int(self.shapes),
             "ACCUMULATES": int(self.accumulates),
             "PROBES": 0,
+            "COUNTS_EVALUATIONS": int(self.counts),
             "HAS_TANGENTS": int(self.tangents),
             **technique_defines(self.technique),
             "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
@@ -263,6 +273,7 @@ def probe_defines(lights: LightNeeds, technique: str) -> dict[str, int]:
         "HAS_SPECULAR": 1,
         "HAS_DIFFUSE": 1,
         "PROBES": 1,
+        "COUNTS_EVALUATIONS": 0,
         **technique_defines(lights.technique(technique)),
         **lights.defines(),
     }

@@ -28,7 +28,7 @@ from app.render.programs import ProgramSpec
 from app.render.storage import storage_bytes
 from app.render.tables import isotropic_textures
 from app.render.techniques import DEFAULT_TECHNIQUE, find_technique, technique_of
-from app.scene import TONE_MAPS, Scene, Shot
+from app.scene import TONE_MAPS, PixelView, Scene, Shot
 
 ATTACHMENTS = {
     "gbuffer": "RGBA32F",
@@ -64,7 +64,11 @@ class Needs:
 
 
 def needs_of(
-    scene: Scene, samples: int, limits: Limits, technique: str = DEFAULT_TECHNIQUE
+    scene: Scene,
+    samples: int,
+    limits: Limits,
+    technique: str = DEFAULT_TECHNIQUE,
+    view: PixelView = "radiance",
 ) -> Needs:
     """Return what a scene needs with ``samples`` per pixel.
 
@@ -73,7 +77,7 @@ def needs_of(
     InputError
         If lights or objects are more than the machine can hold.
     """
-    lighting = LightingFeatures.of(scene, samples, limits, technique)
+    lighting = LightingFeatures.of(scene, samples, limits, technique, view)
     outlines = curve_texels(scene.lights)
     if outlines > limits.storage_texels:
         raise InputError(
@@ -221,14 +225,15 @@ def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path]) -> Plan:
     """
     scene, settings = shot.scene, shot.settings
     technique = technique_of(scene, settings.technique)
-    needs = needs_of(scene, settings.samples, limits, technique)
+    needs = needs_of(scene, settings.samples, limits, technique, settings.view)
     pixels = shot.width * shot.height
     samples = "1 sample" if settings.samples == 1 else f"{settings.samples} samples"
     return Plan(
         f"{shot.width}x{shot.height}, {samples} per pixel, technique {technique} "
         f"({find_technique(technique).description})",
         tuple(
-            _planned_program(spec, roots) for spec in (*needs.programs, display_spec(scene.display))
+            _planned_program(spec, roots)
+            for spec in (*needs.programs, display_spec(scene.display, settings.view))
         ),
         tuple(
             PlannedResource(name, form, pixels * FORMAT_BYTES[form])
@@ -329,6 +334,9 @@ def _passes(shot: Shot, features: LightingFeatures) -> tuple[str, ...]:
         passes.append(f"lighting: {', '.join(does)}{times}")
     else:
         passes.append("clear: there is nothing to see")
+    if features.counts:
+        passes.append("display: evaluations per pixel as colours")
+        return tuple(passes)
     exposure = f"{scene.display.exposure:+g} stops, " if scene.display.exposure else ""
     passes.append(f"display: {exposure}tone map {scene.display.tone_map}, sRGB, dither to 8 bits")
     return tuple(passes)
@@ -399,6 +407,9 @@ def _left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
             else "no glossy material is anisotropic",
             pixels * FORMAT_BYTES["RG32F"],
         )
-    others = [name for name in TONE_MAPS if name != scene.display.tone_map]
-    leave("other tone maps", f"{', '.join(others)} are not chosen")
+    if features.counts:
+        leave("tone maps", "costs have colours of their own")
+    else:
+        others = [name for name in TONE_MAPS if name != scene.display.tone_map]
+        leave("other tone maps", f"{', '.join(others)} are not chosen")
     return tuple(out)

@@ -3,34 +3,52 @@
 from __future__ import annotations
 
 import moderngl
+import numpy as np
 
+from app.render.cost import EMPTY, NONE, OCTAVES, VIRIDIS
 from app.render.programs import Programs, ProgramSpec, set_uniform
 from app.render.state import FullScreenTriangle, begin_pass
-from app.scene import TONE_MAPS, Display
+from app.scene import TONE_MAPS, Display, PixelView
 
 
-def display_spec(display: Display) -> ProgramSpec:
-    """Return the display program of a tone map; exposure is a uniform."""
-    features = {f"TONE_MAP_{name.upper()}": int(name == display.tone_map) for name in TONE_MAPS}
+def display_spec(display: Display, view: PixelView = "radiance") -> ProgramSpec:
+    """Return the display program of a tone map, or of costs; exposure is a uniform."""
+    shows_cost = view == "cost"
+    features = {
+        f"TONE_MAP_{name.upper()}": int(name == display.tone_map and not shows_cost)
+        for name in TONE_MAPS
+    }
+    features["SHOWS_COST"] = int(shows_cost)
+    features["COST_COLORS"] = len(VIRIDIS) if shows_cost else 0
     return ProgramSpec.of("display", "passes/fullscreen.vert", "passes/display.frag", features)
 
 
 class DisplayPass:
-    """Draws the radiance as it should look."""
+    """Draws the radiance, or the cost, as it should look."""
 
     def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
         self._programs = programs
         self._triangle = FullScreenTriangle(ctx)
 
     def draw(
-        self, target: moderngl.Framebuffer, radiance: moderngl.Texture, display: Display
+        self,
+        target: moderngl.Framebuffer,
+        radiance: moderngl.Texture,
+        display: Display,
+        view: PixelView = "radiance",
     ) -> None:
         """Fill ``target`` from its lower left corner, pixel by pixel."""
-        program = self._programs.get(display_spec(display))
+        program = self._programs.get(display_spec(display, view))
         begin_pass(target, radiance.size)
         set_uniform(program, "radiance", 0)
         radiance.use(0)
         set_uniform(program, "exposure_scale", 2.0**display.exposure)
+        if view == "cost":
+            colours = [tuple(float(c) for c in row) for row in np.array(VIRIDIS) / 255.0]
+            set_uniform(program, "cost_colors", colours)
+            set_uniform(program, "cost_octaves", float(OCTAVES))
+            set_uniform(program, "cost_none", tuple(c / 255.0 for c in NONE))
+            set_uniform(program, "cost_empty", tuple(c / 255.0 for c in EMPTY))
         self._triangle.draw(program)
 
     def release(self) -> None:

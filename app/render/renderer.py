@@ -29,7 +29,7 @@ from app.render.sampling import pixel_offset
 from app.render.state import begin_pass, release_framebuffer
 from app.render.techniques import find_technique, suited_technique, technique_of
 from app.render.timers import PassTimers
-from app.scene import Display, RenderSettings, Scene, Shot
+from app.scene import Display, PixelView, RenderSettings, Scene, Shot
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,7 @@ class _Seen:
         return (
             (mine.width, mine.height) == (other.width, other.height)
             and mine.settings.technique == other.settings.technique
+            and mine.settings.view == other.settings.view
             and all(
                 getattr(a, part) is getattr(b, part) or getattr(a, part) == getattr(b, part)
                 for part in ("camera", "materials", "objects", "lights")
@@ -237,7 +238,7 @@ class Renderer:
         """
         radiance = self._radiance_texture()
         with self._timers.measure("display"):
-            self._display.draw(framebuffer, radiance, shot.scene.display)
+            self._display.draw(framebuffer, radiance, shot.scene.display, self._view)
 
     def radiance(self) -> NDArray[np.float32]:
         """Return the mean linear radiance (h, w, 3) float32, row 0 at the top.
@@ -274,7 +275,7 @@ class Renderer:
         if self._displayed != wanted:
             target = self._targets.framebuffer("display")
             with self._timers.measure("display"):
-                self._display.draw(target, radiance, wanted)
+                self._display.draw(target, radiance, wanted, self._view)
             self._displayed = wanted
         return self._targets.texture("display")
 
@@ -514,7 +515,7 @@ class Renderer:
             )
         scene = shot.scene
         technique = technique_of(scene, shot.settings.technique)
-        needs = self._needs_of(scene, samples, technique)
+        needs = self._needs_of(scene, samples, technique, shot.settings.view)
         features = needs.lighting
         self._stale = True
         for spec in needs.programs:
@@ -548,7 +549,7 @@ class Renderer:
         self._displayed = None
         self._cpu_ms = 1e3 * (time.perf_counter() - start)
 
-    def _needs_of(self, scene: Scene, samples: int, technique: str) -> Needs:
+    def _needs_of(self, scene: Scene, samples: int, technique: str, view: PixelView) -> Needs:
         """Return `needs_of`, from the last time if nothing that it depends on is new."""
         if self._needs is not None and self._seen is not None and not self._stale:
             seen = self._seen.shot.scene
@@ -557,9 +558,11 @@ class Renderer:
                 getattr(seen, part) is getattr(scene, part)
                 for part in ("materials", "objects", "lights")
             )
-            if same and self._needs.lighting.accumulates == (samples > 1):
+            lighting = self._needs.lighting
+            same = same and lighting.counts == (view == "cost")
+            if same and lighting.accumulates == (samples > 1):
                 return self._needs
-        return needs_of(scene, samples, self.limits, technique)
+        return needs_of(scene, samples, self.limits, technique, view)
 
     def _add_sample(self) -> None:
         assert self._seen is not None
@@ -626,6 +629,10 @@ class Renderer:
         ):
             self._lighting.set_materials(scene.object_materials(), uniform_texels)
             self._held_materials = (scene.materials, scene.objects, uniform_texels)
+
+    @property
+    def _view(self) -> PixelView:
+        return "radiance" if self._seen is None else self._seen.shot.settings.view
 
     def _radiance_texture(self) -> moderngl.Texture:
         if self._seen is None or not self._newest:

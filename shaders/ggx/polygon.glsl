@@ -162,6 +162,7 @@ void add_pinned_edge(GgxLight light, PlanarEdge edge, GgxView view, inout Pinned
     vec3 u = light.placed.u;
     vec3 v = light.placed.v;
     vec3 w = edge_plane(light.placed, edge);
+    count_evaluations(1);
     vec3 d = edge.d.x * u + edge.d.y * v;
     float c2 = light.distance * light.distance;
     vec3 hc = light.half_vector;
@@ -217,6 +218,7 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
     vec3 shorter = length_q < length_p ? q / length_q : o;
     vec3 move = (d - shorter * (dot(d, p + q) / (length_p + length_q))) /
                 max(length_p, length_q);
+    count_evaluations(1);
     result = half_vector_edge(light.half_vector + difference * view.inverse_alpha,
                               move * view.inverse_alpha, w * inversesqrt(w2), view);
     return true;

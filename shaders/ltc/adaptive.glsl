@@ -23,6 +23,7 @@ float chord_angle(CosineLight light, PowerCurve curve, float from, float to)
                             (from * from + from * to + to * to) * curve.c3);
     vec3 w = d.x * light.center_cross_u + d.y * light.center_cross_v +
              cross_2d(a, d) * light.u_cross_v;
+    count_evaluations(1);
     float w2 = dot(w, w);
     float inverse = w2 < 1e-36 ? 0.0 : inversesqrt(w2);
     float cosine = dot(point_at(light, a), point_at(light, curve_point(curve, to)));

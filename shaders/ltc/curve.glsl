@@ -199,6 +199,7 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
         float middle = from + half_width * float(2 * panel + 1);
         CurveNode first = curve_node(light, curve, middle - OUTER.x * half_width);
         CurveNode last = curve_node(light, curve, middle + OUTER.x * half_width);
+        count_evaluations(2);
         vec2 from_first = nearest_pole(first) / half_width - vec2(OUTER.x, 0.0);
         vec2 from_last = nearest_pole(last) / half_width + vec2(OUTER.x, 0.0);
         float ellipse = min(pole_ellipse(from_first), pole_ellipse(from_last));
@@ -219,6 +220,7 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
 #if CURVE_NODES == 3 || CURVE_NODES == 5
         panel_sum += MIDDLE_WEIGHT * curve_form(curve_node(light, curve, middle));
 #endif
+        count_evaluations(CURVE_NODES - 2);
         sum += half_width * panel_sum;
         ++panel;
         while ((panel & 1) == 0 && halvings > 0) {

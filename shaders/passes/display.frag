@@ -1,13 +1,25 @@
-// Linear radiance to 8-bit sRGB: exposure, tone map, encoding, dither.
+// Linear radiance to 8-bit sRGB: exposure, tone map, encoding, dither. Or costs to colours.
 
+#if SHOWS_COST
+#include "common/cost_color.glsl"
+#else
 #include "common/dither.glsl"
 #include "common/srgb.glsl"
 #include "common/tone_map.glsl"
+#endif
 
 uniform sampler2D radiance;
-uniform float exposure_scale;  // 2^stops
 
 layout(location = 0) out vec4 color;
+
+#if SHOWS_COST
+void main()
+{
+    vec4 value = texelFetch(radiance, ivec2(gl_FragCoord.xy), 0);
+    color = vec4(cost_color(value.r, value.a), 1.0);
+}
+#else
+uniform float exposure_scale;  // 2^stops
 
 const float MAX_EXPOSED = 1e9;
 
@@ -30,3 +42,4 @@ void main()
     vec3 exposed = min(texelFetch(radiance, pixel, 0).rgb * exposure_scale, MAX_EXPOSED);
     color = vec4(quantise(srgb_from_linear(tone_map(exposed)), pixel), 1.0);
 }
+#endif

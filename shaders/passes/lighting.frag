@@ -2,6 +2,7 @@
 // radiance, nothing else. Alpha is coverage.
 
 #include "common/octahedron.glsl"
+#include "common/cost.glsl"
 #include "common/light_data.glsl"
 #include "passes/light_storage.glsl"
 #if HAS_SPECULAR || HAS_DIFFUSE
@@ -102,6 +103,9 @@ void main()
         }
 #endif
     }
+#if COUNTS_EVALUATIONS
+    value.rgb = vec3(float(evaluations));
+#endif
 #if ACCUMULATES
     // The running mean, not a sum: its rounding errors die out instead of adding up.
     if (sample_weight < 1.0) {

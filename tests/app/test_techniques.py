@@ -13,7 +13,8 @@ from app.render.techniques import TECHNIQUES, parse_technique, suited_technique,
 @pytest.mark.parametrize(
     ("text", "name", "number", "canonical"),
     [
-        ("ltc", "ltc", None, "ltc"),
+        ("ltc", "ltc", 4, "ltc"),
+        ("ltc:6", "ltc", 6, "ltc:6"),
         ("ggx", "ggx", 2, "ggx"),
         ("ggx:2", "ggx", 2, "ggx"),
         ("ggx:4", "ggx", 4, "ggx:4"),

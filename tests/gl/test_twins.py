@@ -28,6 +28,7 @@ FEATURES = {
     "HAS_CURVES": 1,
     "CURVE_NODES": 4,
     "CURVE_RULE": 0,
+    "COUNTS_EVALUATIONS": 0,
     "HAS_EXACT_FMA": 0,
     "PROBES": 1,
 }
