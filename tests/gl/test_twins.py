@@ -71,6 +71,7 @@ GPU_ONLY = {
     "curve_form": THROUGH_CURVES,
     "nearest_pole": THROUGH_CURVES,
     "pole_ellipse": THROUGH_CURVES,
+    "node_pair": THROUGH_CURVES,
     "curve_integral": THROUGH_CURVES,
     "add_curve": THROUGH_CURVES,
     "lobe_density": THROUGH_CURVES,
