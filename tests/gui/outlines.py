@@ -32,6 +32,7 @@ def show(app: Application, outline: Outline) -> None:
     """Show one light alone, selected: with nothing to shine on, frames cost little."""
     light = replace(app.scene.lights[0], outline=outline)
     app.window.show(replace(app.scene, objects=(), lights=(light,)), None)
+    app.window.viewport.settings = replace(app.window.viewport.settings, samples=1)
     app.window.editor.selection = Selection.light(0)
     app.frame()
 
