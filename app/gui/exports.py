@@ -13,6 +13,7 @@ from app.gui.messages import Messages
 from app.gui.viewport import Viewport
 from app.images import IMAGE_SUFFIXES, save_image
 from app.panels.export import Export, export_dialog, export_progress
+from app.render.cost import WithLegend
 from app.render.renderer import Renderer
 from app.scene import RenderSettings, Scene, Shot
 
@@ -113,7 +114,8 @@ class Exports:
             while not stopped and not job.is_done and time.perf_counter() < end:
                 job.step()
             if job.is_done:
-                save_image(job.renderer, job.path)
+                shows_cost = job.shot.settings.view == "cost"
+                save_image(WithLegend(job.renderer) if shows_cost else job.renderer, job.path)
                 self._messages.note(f"Wrote {job.path.name}")
         except Exception as failure:
             stopped = True

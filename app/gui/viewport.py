@@ -21,6 +21,7 @@ from app import edits, lights, planes
 from app.editor import NOTHING, Editor, Selection
 from app.errors import InputError
 from app.gui import theme
+from app.gui.cost_legend import cost_legend
 from app.gui.live_picture import LivePicture
 from app.gui.messages import Messages
 from app.gui.outline_tool import OutlineTool, Spot
@@ -126,6 +127,8 @@ class Viewport:
         scene = editor.scene
         self.picture.render(scene, self.camera_of(scene), self.settings, self.view.pixels)
         self.picture.draw(self.view)
+        if self.settings.view == "cost":
+            cost_legend(self.view)
         self._is_asking = False
         if self.show_overlays:
             self._overlays(editor)

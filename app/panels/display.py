@@ -8,13 +8,17 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from app.panels.widgets import choice, heading, label, slider, tooltip
-from app.scene import TONE_MAPS, Display, RenderSettings
+from app.scene import PIXEL_VIEWS, TONE_MAPS, Display, RenderSettings
 
 SAMPLE_COUNTS = (1, 4, 8, 16, 32, 64, 128, 256)
 
 _TONE_MAP_TIP = (
     "agx: gentle, keeps bright colours from clipping; aces: contrasty, as film; "
     "reinhard: soft; none: clips above 1"
+)
+_VIEW_TIP = (
+    "radiance: the picture; cost: how often each pixel evaluates the integral along the "
+    "lights' outlines, in colours"
 )
 
 
@@ -44,7 +48,8 @@ def display_panel(
     technique = settings.technique
     if len(techniques) > 1:
         technique = choice("Technique", technique, techniques, "How lights are integrated")
+    view = choice("View", settings.view, PIXEL_VIEWS, _VIEW_TIP)
     return (
         replace(display, exposure=exposure, tone_map=tone_map),
-        replace(settings, samples=samples, technique=technique),
+        replace(settings, samples=samples, technique=technique, view=view),
     )

@@ -24,6 +24,7 @@ from imgui_bundle import imgui
 from app import edits, lights, planes
 from app.editor import NOTHING, Selection
 from app.panels.export import Export
+from app.render.cost import VIRIDIS
 from app.scene import (
     AreaLight,
     Camera,
@@ -348,6 +349,27 @@ def every_panel_edits_the_scene(app: Application, out: Path) -> None:
     assert app.scene == SCENE
 
 
+def see_the_cost(app: Application, out: Path) -> None:
+    """The view is chosen in the Display panel; its legend stands over the picture."""
+
+    def choose(view: str) -> None:
+        app.act(lambda ctx: ctx.window_focus("//Display"))
+        app.act(lambda ctx: ctx.item_click("//Display/##view"))
+        app.act(lambda ctx: ctx.item_click(f"//$FOCUSED/{view}"))
+        app.settle()
+
+    before, viewport = app.picture(), app.window.viewport
+    choose("cost")
+    assert viewport.settings.view == "cost"
+    # A quadrilateral cut by the ball's horizon takes five edges for each of two lobes.
+    assert app.window.renderer.radiance().max() == 10.0
+    lower_left = app.pixels()[-200:, : viewport.view.pixels[0]].reshape(-1, 3)
+    for colour in (VIRIDIS[0], VIRIDIS[-1]):
+        assert np.abs(lower_left - np.array(colour, float)).max(axis=1).min() <= 8.0
+    choose("radiance")
+    assert np.array_equal(app.picture(), before)
+
+
 def save_reload_compare(app: Application, out: Path) -> None:
     path = out / "saved.json"
     app.drag("vertex 0.2", 30.0, -20.0)
@@ -544,6 +566,7 @@ SCENARIOS = (
     move_and_turn_with_the_gizmo,
     aim_and_look_by_the_context_menu,
     every_panel_edits_the_scene,
+    see_the_cost,
     save_reload_compare,
     save_and_open_by_the_dialog,
     same_picture_as_headless,

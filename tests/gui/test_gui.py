@@ -32,6 +32,7 @@ SCENARIOS = (
     "move_and_turn_with_the_gizmo",
     "aim_and_look_by_the_context_menu",
     "every_panel_edits_the_scene",
+    "see_the_cost",
     "save_reload_compare",
     "save_and_open_by_the_dialog",
     "same_picture_as_headless",
