@@ -37,6 +37,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ltc import polygon, transform
+from ltc.bezier import evaluate, from_line, part, sign_changes
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.intp]
@@ -57,9 +58,6 @@ STRAIGHT = 1e-12
 
 CHUNK = 2**16
 """Corners of polygons at a time: more would not fit the caches."""
-
-NEAREST = 2e-16
-"""Parameter between a curve's end and a crossing of it, at least: rounding."""
 
 
 def specular_epsilon(alpha: npt.ArrayLike) -> FloatArray:
@@ -153,7 +151,7 @@ def adaptive(
         if not len(item):
             break
         step = 1.0 / (divisions * 2**level)
-        p0, p1, p2 = (_evaluate(points[item], (index + part) * step) for part in (0.0, 0.5, 1.0))
+        p0, p1, p2 = (evaluate(points[item], (index + half) * step) for half in (0.0, 0.5, 1.0))
         halves = _edge(p0, p1) + _edge(p1, p2)
         triangle = halves + _edge(p2, p0)
         which = owner[item]
@@ -204,13 +202,13 @@ def uniform(
         evaluations += corners
         rows = max(1, CHUNK // corners)
         for start in range(0, len(chain) if corners > 2 else 0, rows):
-            part = slice(start, start + rows)
+            some = slice(start, start + rows)
             loop = [
-                curve[:, :1] if line else _evaluate(curve[:, None], t)
-                for curve, line in zip(np.moveaxis(chain[part], 1, 0), straight, strict=True)
+                curve[:, :1] if line else evaluate(curve[:, None], t)
+                for curve, line in zip(np.moveaxis(chain[some], 1, 0), straight, strict=True)
             ]
             polygons = np.concatenate(loop, axis=1)
-            value[part] += polygon.ltc_polygon_form_factor(matrix[part], [polygons])
+            value[some] += polygon.ltc_polygon_form_factor(matrix[some], [polygons])
     return Counted(value.reshape(shape), evaluations.reshape(shape))
 
 
@@ -228,100 +226,6 @@ def is_straight(curves: npt.ArrayLike) -> BoolArray:
     scale = np.where(length2 > 0.0, length2, 1.0)[..., None]
     rest = d - longest * (np.sum(d * longest, axis=-1) / scale)[..., None]
     return np.asarray(np.all(np.sum(rest * rest, axis=-1) <= STRAIGHT**2 * scale, axis=-1))
-
-
-def crossings(z: npt.ArrayLike) -> tuple[FloatArray, IntArray]:
-    """Return where cubics change sign, 0 counted as negative.
-
-    Parameters
-    ----------
-    z : (m, 4) float64
-        Bernstein coefficients of z(t).
-
-    Returns
-    -------
-    roots : (m, 3) float64
-        In (0, 1), ascending; 1 where there are fewer.
-    count : (m) int
-        How many there are. Odd if and only if exactly one of z(0) and z(1) is positive.
-
-    Notes
-    -----
-    The roots of z'(t), in a form that a vanishing leading coefficient does not harm, cut
-    [0, 1] into intervals where z is monotonic. A sign change is closed in by Newton's steps,
-    replaced by halving where they leave the interval that is known.
-    """
-    z = np.asarray(z, dtype=np.float64)
-    bounds = np.concatenate([np.zeros((len(z), 1)), _extrema(z), np.ones((len(z), 1))], axis=1)
-    heights = np.stack([_cubic(z, bounds[:, i])[0] for i in range(4)], axis=1)
-    heights[:, 0], heights[:, 3] = z[:, 0], z[:, 3]
-    above = heights > 0.0
-    crosses = above[:, :-1] != above[:, 1:]
-    row, column = np.nonzero(crosses)
-    lo, hi = bounds[row, column], bounds[row, column + 1]
-    rises = above[row, column + 1]
-    t = 0.5 * (lo + hi)
-    for _ in range(60):
-        value, slope = _cubic(z[row], t)
-        inside = (value > 0.0) == rises
-        hi, lo = np.where(inside, t, hi), np.where(inside, lo, t)
-        step = np.full(t.shape, np.inf)
-        np.divide(value, slope, out=step, where=np.abs(slope) > np.abs(value))
-        newton = t - np.where(np.isfinite(step), step, 0.0)
-        within = np.isfinite(step) & (newton > lo) & (newton < hi)
-        following = np.where(within, newton, 0.5 * (lo + hi))
-        following = np.clip(following, NEAREST, 1.0 - NEAREST)
-        done = np.abs(following - t) <= NEAREST
-        t = following
-        if np.all(done):
-            break
-    found = np.ones((len(z), 3))
-    found[row, column] = t
-    return np.sort(found, axis=1), np.sum(crosses, axis=1)
-
-
-def _extrema(z: FloatArray) -> FloatArray:
-    """Return (m, 2): the roots of z'(t) within [0, 1], ascending, 0 in place of missing ones."""
-    d = np.diff(z, axis=1)
-    a, b, c = d[:, 0] - 2.0 * d[:, 1] + d[:, 2], d[:, 1] - d[:, 0], d[:, 0]
-    # a t^2 + 2 b t + c = 0: q = -(b + sign(b) root) never cancels; roots q/a and c/q.
-    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
-    q = -(b + np.copysign(root, b))
-    real = b * b >= a * c
-    out = np.zeros((len(z), 2))
-    np.divide(q, a, out=out[:, 0], where=real & (np.abs(q) <= np.abs(a)) & (a != 0.0))
-    np.divide(c, q, out=out[:, 1], where=real & (np.abs(c) <= np.abs(q)) & (q != 0.0))
-    return np.sort(np.clip(out, 0.0, 1.0), axis=1)
-
-
-def _cubic(z: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return z(t) and z'(t), (m), of Bernstein coefficients (m, 4)."""
-    s = 1.0 - t
-    ab, bc, cd = (s * z[:, i] + t * z[:, i + 1] for i in range(3))
-    abc, bcd = s * ab + t * bc, s * bc + t * cd
-    return s * abc + t * bcd, 3.0 * (bcd - abc)
-
-
-def _evaluate(points: FloatArray, t: FloatArray) -> FloatArray:
-    """Return the points (..., 3) at t of cubics (..., 4, 3)."""
-    t = np.asarray(t)[..., None]
-    s = 1.0 - t
-    p0, p1, p2, p3 = (points[..., i, :] for i in range(4))
-    return np.asarray(s * s * s * p0 + 3.0 * s * t * (s * p1 + t * p2) + t * t * t * p3)
-
-
-def _part(points: FloatArray, lo: FloatArray, hi: FloatArray) -> FloatArray:
-    """Return the control points (m, 4, 3) of the parts [lo, hi] of cubics, by blossoming."""
-    lo, hi = lo[:, None], hi[:, None]
-
-    def blossom(*arguments: FloatArray) -> FloatArray:
-        row = points
-        for t in arguments:
-            row = (1.0 - t)[..., None] * row[:, :-1] + t[..., None] * row[:, 1:]
-        return row[:, 0]
-
-    parts = [blossom(lo, lo, lo), blossom(lo, lo, hi), blossom(lo, hi, hi), blossom(hi, hi, hi)]
-    return np.stack(parts, axis=1)
 
 
 def _edge(p: FloatArray, q: FloatArray) -> FloatArray:
@@ -374,17 +278,17 @@ def _clip(curves: _Curves) -> _Curves:
     below = np.all(curves.points[..., 2] <= 0.0, axis=1)
     if not np.any(curves.points[..., 2] <= 0.0):
         return curves
-    roots, count = crossings(curves.points[..., 2])
+    roots, count = sign_changes(curves.points[..., 2])
     m = len(count)
     bounds = np.concatenate([np.zeros((m, 1)), roots, np.ones((m, 1))], axis=1)
     starts_above = curves.points[:, 0, 2] > 0.0
-    part = np.arange(4)
-    keep = (starts_above[:, None] ^ (part % 2 == 1)) & (part <= count[:, None]) & ~below[:, None]
+    j = np.arange(4)
+    keep = (starts_above[:, None] ^ (j % 2 == 1)) & (j <= count[:, None]) & ~below[:, None]
     row, column = np.nonzero(keep)
     pieces = curves.pick(row)
     cut = count[row] > 0
     points = pieces.points.copy()
-    points[cut] = _part(points[cut], bounds[row, column][cut], bounds[row, column + 1][cut])
+    points[cut] = part(points[cut], bounds[row, column][cut], bounds[row, column + 1][cut])
     enters, leaves = column > 0, column < count[row]
     points[enters, 0, 2] = 0.0
     points[leaves, 3, 2] = 0.0
@@ -400,10 +304,7 @@ def _clip(curves: _Curves) -> _Curves:
     # An exit is followed by the first entry of a later piece, else by the loop's first one.
     later = np.searchsorted(entries, exits, side="right")
     partner = entries[np.where(later < last, later, first)]
-    a, b = points[exits, 3], points[partner, 0]
-    thirds = np.arange(4)[:, None] / 3.0
-    closing = a[:, None] + thirds * (b - a)[:, None]
-    closing[:, 3] = b
+    closing = from_line(points[exits, 3], points[partner, 0])
     order = np.argsort(np.concatenate([2 * np.arange(len(loop)), 2 * exits + 1]), kind="stable")
     together = _Curves(
         np.concatenate([points, closing]),

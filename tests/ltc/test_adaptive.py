@@ -1,14 +1,14 @@
-"""The published methods for curved lights, against polygons of very many edges.
+"""The published methods for curved lights, against the curves' own integral.
 
-`ltc.polygon` is the independent route: a polygon of n edges a curve errs like 1/n^2,
-so two of them give the limit by Richardson's extrapolation, here to about 1e-7.
+That is quadrature of the one-form (`ltc.bezier`), which has neither edges nor triangles.
 """
 
 import numpy as np
 import pytest
 
 from ltc import adaptive, transform
-from ltc.adaptive import crossings, is_straight, specular_epsilon, uniform
+from ltc.adaptive import is_straight, specular_epsilon, uniform
+from ltc.bezier import ltc_form_factor
 from ltc.table import load_isotropic
 from tests.ltc.test_polygon import place, random_planes
 
@@ -92,10 +92,8 @@ def place_curves(chain, c, u, v) -> np.ndarray:
     return points.reshape(*points.shape[:-2], *chain.shape[:-1], 3)
 
 
-def limit(matrix, loops, edges: int = 256) -> np.ndarray:
-    coarse = uniform(matrix, loops, edges).value
-    fine = uniform(matrix, loops, 2 * edges).value
-    return fine + (fine - coarse) / 3.0
+def limit(matrix, loops) -> np.ndarray:
+    return ltc_form_factor(matrix, loops).value
 
 
 @pytest.mark.parametrize(
@@ -235,30 +233,15 @@ def test_a_point_on_the_outline_ends():
     assert abs(float(found.value)) <= 0.5 + 1e-9
 
 
-def test_crossings_are_those_of_dense_sampling(rng):
-    """Cubics, raised quadratics, lines and constants: signs change at the roots only."""
-    z = rng.normal(size=(400, 4))
-    a, b, c = rng.normal(size=(3, 100))
-    z[100:200] = np.stack([a, (a + 2 * b) / 3, (2 * b + c) / 3, c], axis=-1)
-    z[200:300] = np.stack([a, (2 * a + b) / 3, (a + 2 * b) / 3, b], axis=-1)
-    z[300:310] = a[:10, None]
-    roots, count = crossings(z)
-    t = np.linspace(0.0, 1.0, 4001)
-    s = 1.0 - t
-    basis = np.stack([s**3, 3 * s * s * t, 3 * s * t * t, t**3])
-    above = z @ basis > 0.0
-    np.testing.assert_array_equal(np.sum(above[:, 1:] != above[:, :-1], axis=1), count)
-    assert np.all(np.diff(roots, axis=1) >= 0.0)
-    first, t = z[count > 0], roots[count > 0, 0]
-    s = 1.0 - t
-    basis = np.stack([s**3, 3 * s * s * t, 3 * s * t * t, t**3], axis=-1)
-    assert np.max(np.abs(np.sum(first * basis, axis=-1))) < 1e-14
-
-
-def test_crossings_with_ends_on_zero():
-    z = np.array([[0.0, 1, 1, 1], [0.0, -1, 1, 1], [1.0, 1, 1, 0], [0, 0, 0, 0], [-1.0, 2, 2, -1]])
-    _, count = crossings(z)
-    np.testing.assert_array_equal(count, [1, 1, 1, 0, 2])
+def test_uniform_converges_to_the_curves(rng):
+    """Like 1/n^2: extrapolated from 64 and 128 edges it is the curves' own integral."""
+    c, u, v = random_planes(rng, 40)
+    matrix = transform.invert(load_isotropic().matrix(0.2, rng.uniform(0.1, 1.0, 40)))
+    loops = [place_curves(chain, c, u, v) for chain in OUTLINES["ring"]]
+    coarse, fine = (uniform(matrix, loops, edges).value for edges in (64, 128))
+    truth = limit(matrix, loops)
+    assert np.max(np.abs(fine - truth)) > 1e-6
+    np.testing.assert_allclose(fine + (fine - coarse) / 3.0, truth, rtol=0.0, atol=2e-7)
 
 
 def test_straight_curves_are_told(rng):
