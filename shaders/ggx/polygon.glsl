@@ -27,12 +27,13 @@ vec3 ggx_weights(vec3 h, GgxView view)
     return vec3(v_h / (h2 * h2), smith, smith * (x2 * x2 * x));
 }
 
-#if GGX_NODES > 1
 // A node of the outline: the unit half vector and its change, times the node's weight.
 struct FanNode {
     vec3 u;
     vec3 du;
 };
+
+#if GGX_NODES > 1
 
 // Gauss and Legendre's nodes and weights on [0, 1], i from 0.
 vec2 along_edge(int i)
@@ -156,32 +157,36 @@ struct PinnedSum {
     float area;   // twice the clipped area in (s, t)
 };
 
-// Two Gauss-Legendre nodes: the outline is within 3 % of the lobe's width.
-void add_pinned_edge(GgxLight light, PlanarEdge edge, GgxView view, inout PinnedSum sum)
+// A place on the outline: p about the light's centre, d = dp and w = r x dr times a weight.
+void add_pinned_node(GgxLight light, vec3 p, vec3 d, vec3 w, GgxView view, inout PinnedSum sum)
 {
-    vec3 u = light.placed.u;
-    vec3 v = light.placed.v;
-    vec3 w = edge_plane(light.placed, edge);
-    count_evaluations(1);
-    vec3 d = edge.d.x * u + edge.d.y * v;
     float c2 = light.distance * light.distance;
     vec3 hc = light.half_vector;
     float hc2 = dot(hc, hc);
+    vec3 r = light.placed.center + p;
+    float r2 = dot(r, r);
+    float distance = sqrt(r2);
+    sum.solid -= w * (dot(2.0 * light.placed.center + p, p) / (r2 * c2));
+    vec3 difference = direction_difference(light, p, distance);
+    vec3 o = light.toward + difference;
+    vec3 q = difference * view.inverse_alpha;
+    vec3 h = hc + q;
+    vec3 rate = (d - o * dot(o, d)) / distance;
+    float excess = dot(2.0 * hc + q, q) / (dot(h, h) * hc2);
+    sum.lobe -= excess * cross(view.wo + o, rate);
+}
+
+// Two Gauss-Legendre nodes: the outline is within 3 % of the lobe's width.
+void add_pinned_edge(GgxLight light, PlanarEdge edge, GgxView view, inout PinnedSum sum)
+{
+    vec3 w = edge_plane(light.placed, edge);
+    vec3 d = edge.d.x * light.placed.u + edge.d.y * light.placed.v;
+    count_evaluations(1);
     sum.area += edge.moment;
     for (int i = 0; i < 2; ++i) {
         vec2 st = 0.5 * (edge.a + edge.b) + (i == 0 ? -0.288675135 : 0.288675135) * edge.d;
-        vec3 dp = st.x * u + st.y * v;
-        vec3 r = light.placed.center + dp;
-        float r2 = dot(r, r);
-        float distance = sqrt(r2);
-        sum.solid -= 0.5 * w * (dot(2.0 * light.placed.center + dp, dp) / (r2 * c2));
-        vec3 difference = direction_difference(light, dp, distance);
-        vec3 o = light.toward + difference;
-        vec3 q = difference * view.inverse_alpha;
-        vec3 h = hc + q;
-        vec3 rate = (d - o * dot(o, d)) / distance;
-        float excess = dot(2.0 * hc + q, q) / (dot(h, h) * hc2);
-        sum.lobe -= (0.5 * excess) * cross(view.wo + o, rate);
+        vec3 p = st.x * light.placed.u + st.y * light.placed.v;
+        add_pinned_node(light, p, 0.5 * d, 0.5 * w, view, sum);
     }
 }
 
@@ -225,115 +230,7 @@ bool light_edge(GgxLight light, PlanarEdge edge, GgxView view, out HalfVectorEdg
 }
 
 #if HAS_CURVES
-// Largest radiance that a chord may be wrong by, of a light of radiance 1: chords of one curve
-// err to the same side, and nothing is added for what lies between.
-const float GGX_CHORD_ERROR = 1e-5;
-
-// Chords of a curve are 2^-10 of it at least.
-const int MOST_CHORD_HALVINGS = 10;
-
-// The chord of the piece of a leaf where the walk is. `scale`: the share of the leaf that pieces
-// of this size are.
-PlanarEdge piece_chord(PlanarEdge whole, PowerCurve curve, int piece, float scale)
-{
-    float from = scale * float(piece);
-    float to = scale * float(piece + 1);
-    PlanarEdge edge;
-    // `precise`: what ends here and what starts here must agree to the bit.
-    precise vec2 a = curve_point(curve, from);
-    precise vec2 b = curve_point(curve, to);
-    edge.a = piece == 0 ? whole.a : a;
-    edge.b = to == 1.0 ? whole.b : b;
-    // b - a, without its cancellation.
-    float h = to - from;
-    edge.d = h * (curve.c1 + (to + from) * curve.c2 +
-                  (to * to + to * from + from * from) * curve.c3);
-    edge.moment = cross_2d(edge.a, edge.d);
-    return edge;
-}
-
-// Upper bound of the lobe's integral over an area [m^2] inside a disc (center, radius) about
-// the light's origin: GGX's density |h|^4 / (2 pi ax ay (|bent| + bent.z) |h'|^4), h = v + o,
-// times depth / distance^3.
-float ggx_integral_bound(GgxLight about, GgxView view, float depth, vec3 disc, float area)
-{
-    vec2 at = disc.xy - about.placed.anchor;
-    vec3 r = about.placed.center + at.x * about.placed.u + at.y * about.placed.v;
-    float distance = length(r);
-    float nearest = max(distance - disc.z, abs(depth));
-    // No direction to the disc is farther than this from the one to its center.
-    float spread = min(2.0 * disc.z / nearest, 2.0);
-    vec3 h = view.wo + r / max(distance, 1e-30);
-    float longest = min(length(h) + spread, 2.0);
-    // Along and across the surface, h' = h / (ax, ay, 1) is at least so long.
-    vec2 sides = max(abs(h.xy) - spread, 0.0) * view.inverse_alpha.xy;
-    float shortest2 = max(dot(sides, sides) + max(h.z - spread, 0.0) * max(h.z - spread, 0.0),
-                          view.wo.z * view.wo.z);
-    float longest2 = longest * longest;
-    float density = 0.159154943 * view.inverse_alpha.x * view.inverse_alpha.y *
-                    longest2 * longest2 /
-                    ((view.bent_length + view.bent.z) * shortest2 * shortest2);
-    return area * density * abs(depth) / (nearest * nearest * nearest);
-}
-
-// The next edge: a chord of the tree, or of a piece of a curve so short that what lies
-// between does not matter. Pieces of a leaf are as good as parabolas: half of one has an
-// eighth of the area.
-bool ggx_contour_edge(
-    PlanarLight light, GgxLight about, GgxView view, float depth, inout Contour contour,
-    out PlanarEdge edge)
-{
-    if (contour.closing) {
-        edge = closing_edge(contour);
-        return true;
-    }
-    ContourNode node;
-    if (!contour_node(light, about.placed, contour, node)) {
-        return false;
-    }
-    float scale = exp2(-float(contour.halvings));
-    vec3 disc = node.disc;
-    PlanarEdge whole;
-    PowerCurve curve;
-    if (contour.halvings > 0) {
-        whole = node_chord(light, about.placed, contour);
-        curve = power_curve(PlanarCurve(whole.a, whole.d, node.handles.xy, node.handles.zw));
-        edge = piece_chord(whole, curve, contour.piece, scale);
-        disc = vec3(0.5 * (edge.a + edge.b) + about.placed.anchor, length(edge.d));
-    }
-    bool is_chord = contour.halvings == MOST_CHORD_HALVINGS ||
-                    ggx_integral_bound(about, view, depth, disc,
-                                       node.area * scale * scale * scale) <= GGX_CHORD_ERROR;
-    if (!is_chord) {
-        contour.next += node.is_inner ? 1 : 0;
-        contour.halvings += node.is_inner ? 0 : 1;
-        contour.piece *= 2;
-        return false;
-    }
-    if (contour.halvings == 0) {
-        edge = node_chord(light, about.placed, contour);
-        contour.next = node.after;
-    } else {
-        // After the second half of a piece comes the one it is half of.
-        ++contour.piece;
-        while ((contour.piece & 1) == 0 && contour.halvings > 0) {
-            contour.piece >>= 1;
-            --contour.halvings;
-        }
-        if (contour.halvings == 0) {
-            contour.piece = 0;
-            contour.next = node.after;
-        }
-    }
-    return clip_edge(contour, edge);
-}
-#else
-bool ggx_contour_edge(
-    PlanarLight light, GgxLight about, GgxView view, float depth, inout Contour contour,
-    out PlanarEdge edge)
-{
-    return contour_edge(light, about.placed, contour, edge);
-}
+#include "ggx/curve.glsl"
 #endif
 
 #if GGX_NODES > 1
@@ -354,6 +251,7 @@ vec2 ggx_light_specular(
     vec3 center = vec3(0.0);
     vec3 at_center = vec3(0.0);
     float share = 0.0;
+    float slivers = 0.0;
 #if GGX_NODES > 1
     FanSum fan = FanSum(0.0, vec2(0.0));
     FanNode nodes[STORED_NODES];
@@ -363,10 +261,49 @@ vec2 ggx_light_specular(
     for (int round = 0; round < 2; ++round) {
         Contour contour = contour_start(light, plane, about.placed, normal);
         while (!contour_ends(light, contour)) {
-            PlanarEdge planar;
-            if (!ggx_contour_edge(light, about, view, plane.depth, contour, planar)) {
+#if HAS_CURVES
+            ContourPart part;
+            float sliver;
+            if (!ggx_contour_part(light, about, view, plane.depth, contour, part, sliver)) {
                 continue;
             }
+            slivers += sliver;
+            PlanarEdge planar = part.edge;
+            if (part.is_curve && pinned) {
+                add_pinned_curve(about, part, view, pinned_sum);
+                continue;
+            }
+            if (part.is_curve) {
+                PowerCurve curve = power_curve(part.curve);
+                Panels panels = panels_of(part.from, part.to);
+                while (has_panel(panels)) {
+                    if (!is_panel_ready(about, curve, view, panels)) {
+                        halve_panel(panels);
+                        continue;
+                    }
+                    for (int i = 0; i < 4; ++i) {
+                        vec3 integral;
+                        FanNode node = curve_fan_node(about, curve, view, panels, i, integral);
+                        vector += integral;
+#if GGX_NODES > 1
+                        if (round == 1) {
+                            add_fan_node(node, center, at_center, view, fan);
+                        } else if (count < STORED_NODES) {
+                            nodes[count] = node;
+                        }
+                        ++count;
+#endif
+                    }
+                    next_panel(panels);
+                }
+                continue;
+            }
+#else
+            PlanarEdge planar;
+            if (!contour_edge(light, about.placed, contour, planar)) {
+                continue;
+            }
+#endif
             if (pinned) {
                 add_pinned_edge(about, planar, view, pinned_sum);
                 continue;
@@ -394,7 +331,7 @@ vec2 ggx_light_specular(
         }
         vector = pinned ? pinned_vector(about, pinned_sum, view) : vector;
         vector *= winding;
-        share = min(scale * dot(vector, view.bent), 1.0);
+        share = min(scale * dot(vector, view.bent) + slivers, 1.0);
         float length2 = dot(vector, vector);
         // Nothing lit, or no more than rounding.
         if (!(share > 0.0) || length2 < 1e-36) {

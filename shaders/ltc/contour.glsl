@@ -22,8 +22,6 @@ struct Contour {
 #if HAS_CURVES
     float from;        // where on the curve at `next` to go on, 0 at its start
     bool above;        // whether the curve is above the surface there
-    int piece;         // the same for techniques that take curves in 2^halvings chords
-    int halvings;
 #endif
 };
 
@@ -34,7 +32,7 @@ Contour contour_start(PlanarLight light, PlaneView view, CosineLight anchored, v
                                     : view.depth * dot(normal, light.n);
     return Contour(slope, base, vec2(0.0), false, false, vec2(0.0), vec2(0.0), 0
 #if HAS_CURVES
-                   , 0.0, false, 0, 0
+                   , 0.0, false
 #endif
     );
 }

@@ -104,6 +104,8 @@ float next_crossing(vec4 z, float from, float to, bool above)
     return min(t, 0.9999999 * to);
 }
 
+#if !CURVE_RULE
+
 // A place on a curve as the integral sees it: its azimuth where it is below the horizon.
 struct CurveNode {
     vec3 r;         // in the cosine's frame
@@ -162,8 +164,49 @@ const vec2 SECOND = vec2(0.661209386466, 0.360761573048);
 const vec2 THIRD = vec2(0.238619186083, 0.467913934573);
 #endif
 
-// Panels are 2^-16 of a curve at least: float32 knows no more of a place on it.
+// A part of a curve in panels, one after the other, halved where they must be: after the second
+// half of one comes the one it is half of. A counter, not a stack.
+struct Panels {
+    float from;
+    float half_width;
+    int index;       // of the panel among those of its width
+    int halvings;
+};
+
+// Panels are 2^-16 of a part at least: float32 knows no more of a place on it.
 const int MOST_HALVINGS = 16;
+
+Panels panels_of(float from, float to)
+{
+    return Panels(from, 0.5 * (to - from), 0, 0);
+}
+
+bool has_panel(Panels panels)
+{
+    return panels.index < 1 || panels.halvings > 0;
+}
+
+float panel_middle(Panels panels)
+{
+    return panels.from + panels.half_width * float(2 * panels.index + 1);
+}
+
+void halve_panel(inout Panels panels)
+{
+    panels.half_width *= 0.5;
+    panels.index *= 2;
+    ++panels.halvings;
+}
+
+void next_panel(inout Panels panels)
+{
+    ++panels.index;
+    while ((panels.index & 1) == 0 && panels.halvings > 0) {
+        panels.index >>= 1;
+        --panels.halvings;
+        panels.half_width *= 2.0;
+    }
+}
 
 // Limits of rho + 1/rho for the ellipse with foci at a panel's ends that keeps its pole outside.
 // At 3.6 four nodes err by rho^-8 = 1e-4 of what the pole contributes, which is little wherever
@@ -190,13 +233,11 @@ float node_pair(
 // Integral over a part of the curve.
 float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
 {
-    float half_width = 0.5 * (to - from);
-    int panel = 0;
-    int halvings = 0;
+    Panels panels = panels_of(from, to);
     float sum = 0.0;
-    // Panels in order: after the second half of one comes the one it is half of.
-    while (panel < 1 || halvings > 0) {
-        float middle = from + half_width * float(2 * panel + 1);
+    while (has_panel(panels)) {
+        float middle = panel_middle(panels);
+        float half_width = panels.half_width;
         CurveNode first = curve_node(light, curve, middle - OUTER.x * half_width);
         CurveNode last = curve_node(light, curve, middle + OUTER.x * half_width);
         count_evaluations(2);
@@ -204,10 +245,8 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
         vec2 from_last = nearest_pole(last) / half_width + vec2(OUTER.x, 0.0);
         float ellipse = min(pole_ellipse(from_first), pole_ellipse(from_last));
         bool has_kink = (first.r.z > 0.0) != (last.r.z > 0.0);
-        if (ellipse < (has_kink ? FAR_FROM_KINK : FAR_POLE) && halvings < MOST_HALVINGS) {
-            half_width *= 0.5;
-            ++halvings;
-            panel *= 2;
+        if (ellipse < (has_kink ? FAR_FROM_KINK : FAR_POLE) && panels.halvings < MOST_HALVINGS) {
+            halve_panel(panels);
             continue;
         }
         float panel_sum = OUTER.y * (curve_form(first) + curve_form(last));
@@ -222,12 +261,7 @@ float curve_integral(CosineLight light, PowerCurve curve, float from, float to)
 #endif
         count_evaluations(CURVE_NODES - 2);
         sum += half_width * panel_sum;
-        ++panel;
-        while ((panel & 1) == 0 && halvings > 0) {
-            panel >>= 1;
-            --halvings;
-            half_width *= 2.0;
-        }
+        next_panel(panels);
     }
     return sum;
 }
@@ -244,3 +278,5 @@ void add_curve(
     sum.top = max(sum.top, light.center.z + max(max(z.x, z.y), max(z.z, z.w)));
     sum.angle += curve_integral(light, power_curve(planar), from, to);
 }
+
+#endif

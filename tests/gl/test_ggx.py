@@ -62,9 +62,13 @@ GPU_ONLY = {
     "pinned_vector": STAGE,
     "light_edge": STAGE,
     "ggx_light_specular": STAGE,
-    "ggx_integral_bound": STAGE,
-    "ggx_contour_edge": STAGE,
-    "piece_chord": STAGE,
+    "ggx_sliver": STAGE,
+    "ggx_contour_part": STAGE,
+    "half_vector_node": STAGE,
+    "is_panel_ready": STAGE,
+    "curve_fan_node": STAGE,
+    "add_pinned_curve": STAGE,
+    "add_pinned_node": STAGE,
     "ggx_terms": STAGE,
 }
 
