@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from app.presets import heart, ring
+from app.render.features import LightingFeatures
+from app.render.lighting import lighting_spec
+from app.render.programs import shader_roots
 from app.render.tables import isotropic_textures
 from app.render.truth import exact_radiance, shading_contours, shading_frames
 from app.scene import AreaLight, Material, RenderSettings, Scene, SceneObject, Shot
@@ -132,6 +135,16 @@ def test_programs_hold_one_rule(renderer):
     assert len({lighting(curved, name) for name in names}) == 4
     assert "ltc/curve.glsl" in lighting(curved, "adaptive").files
     assert "ltc/curve.glsl" not in lighting(curved, "uniform:30").files
+    text = {
+        name: lighting_spec(LightingFeatures.of(curved, 1, renderer.limits, name))
+        .sources(shader_roots())[1]
+        .text
+        for name in ("ltc", "adaptive")
+    }
+    assert "curve_integral(" in text["ltc"]
+    assert "chord_sum(" not in text["ltc"]
+    assert "chord_sum(" in text["adaptive"]
+    assert "curve_integral(" not in text["adaptive"]
     assert lighting(curved, "uniform:18") == lighting(curved, "uniform")
 
 
