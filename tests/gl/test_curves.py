@@ -23,9 +23,11 @@ from app.scene import (
     Scene,
     TextSource,
 )
+from app.scene_io import load_scene
 from app.text import text_outline
 from ltc.bezier import form_factor, ltc_specular, positive_winding
 from ltc.reference import curve_specular_integral_batch
+from ltc.resources import resource_path
 from ltc.table import sample_textures
 from tests.gl.test_probe import FloatArray, Points, lamp_points, random_points, unit
 
@@ -77,6 +79,11 @@ def letter(text: str) -> Outline:
     return text_outline(TextSource(text, size=2.0))
 
 
+def logo() -> Outline:
+    scene = load_scene(resource_path("assets", "scenes", "14-logo.json"))
+    return scene.lights[0].outline
+
+
 SQUARE = PolygonContour(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 OUTLINES = {
     "disk": disk,
@@ -88,6 +95,8 @@ OUTLINES = {
     "g": lambda: letter("g"),
     "B": lambda: letter("B"),
     "word": lambda: letter("Light"),
+    "logo": logo,
+    "touching": lambda: Outline((*moved(disk(), -0.5, 0, 0.5), *moved(disk(), 0.5, 0, 0.5))),
     "smooth": lambda: Outline((smooth(np.random.default_rng(1), 7),)),
     "wild": lambda: Outline((wild(np.random.default_rng(2), 5),)),
     "wild, nonzero": lambda: Outline((wild(np.random.default_rng(3), 6),), "nonzero"),
