@@ -1,9 +1,9 @@
 """``ltc-viewer bench``: how long the passes take, by scene and technique, and how much they err.
 
 Errors are those of the integration alone: at random pixels' surface points every technique
-is compared with the limit that it approximates, the lobe of ``ltc`` integrated in float64
-along the very curves (`app.render.truth`). For ``ggx`` that is another lobe, so
-it has none here.
+is compared with the limit that it approximates, its lobe integrated in float64 along the
+very curves (`app.render.truth`): the fitted lobe of ``ltc`` for all but ``ggx``, whose
+lobe is GGX.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from app.cli.common import (
 )
 from app.errors import InputError
 from app.files import check_output, replace_file
-from app.render.techniques import AUTOMATIC, parse_technique, suited_technique, technique_of
-from app.render.truth import exact_radiance
+from app.render.techniques import AUTOMATIC, find_technique, suited_technique, technique_of
+from app.render.truth import Lobe, exact_radiance, shading_frames
 from app.scene import ALPHA_MIN, Material, RenderSettings, Scene, Shot
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Row:
     """One measured shot: ``passes`` by name, and ``wall``, the whole frame with a glFinish.
 
     ``alpha`` is what all materials were given, None where they keep their own; ``errors``
-    are those of the two lobes, empty where none were asked for or there is no truth.
+    are those of specular and diffuse radiance, empty where none were asked for.
     """
 
     scene: str
@@ -260,48 +260,58 @@ class Exact:
         self._points = points
         self._scene: Scene | None = None
         self._inputs: dict[str, FloatArray] = {}
-        self._truth: dict[str, FloatArray] = {}
+        self._truth: dict[Lobe, dict[str, FloatArray]] = {}
 
     def errors(self, job: Job) -> dict[str, Errors]:
-        """Return the errors of the shot that was rendered last; empty where there is no truth."""
+        """Return the errors of the shot that was rendered last; empty if it shows no surface."""
         shot = job.shot
-        if not parse_technique(shot.settings.technique).technique.has_tables:
-            return {}
-        lit = tuple(replace(lamp, radiance=(1.0, 1.0, 1.0)) for lamp in shot.scene.lights
-                    if any(lamp.radiance))  # fmt: skip
+        lights = (light for light in shot.scene.lights if any(light.radiance))
+        lit = tuple(replace(light, radiance=(1.0, 1.0, 1.0)) for light in lights)
         scene = replace(shot.scene, lights=lit)
         if scene != self._scene:
-            self._scene = scene
+            self._scene, self._truth = scene, {}
             self._choose(scene)
         if not len(self._inputs["position"]):
             return {}
         found = self._renderer.probe(scene, shot.settings, **self._inputs)
-        return {name: Errors.of(found[name], truth) for name, truth in self._truth.items()}
+        has_tables = find_technique(shot.settings.technique).has_tables
+        truth = self._exact(scene, "ltc" if has_tables else "ggx")
+        return {name: Errors.of(found[name], truth[name]) for name in truth}
 
     def _choose(self, scene: Scene) -> None:
+        """Choose pixels; what the probe gets is rounded first, so that both see the same points."""
         seen = self._renderer.surfaces()
         rng = np.random.default_rng(0)
         count = min(self._points, len(seen.index))
         which = rng.choice(len(seen.index), count, replace=False)
         materials = scene.object_materials()
-        alpha = np.array([m.alpha for m in materials]).reshape(-1, 2)[seen.index[which]]
-        # Rounded first, so that GPU and truth see the very same points.
-        position, normal, view = (
-            a[which].astype(np.float32).astype(np.float64)
-            for a in (seen.position, seen.normal, seen.view)
-        )
-        alpha = alpha.astype(np.float32).astype(np.float64)
-        self._inputs = {
-            "position": position,
-            "normal": normal,
-            "tangent": np.zeros_like(normal),
-            "view": view,
-            "alpha": alpha,
+        # Without the mesh's own tangents there is but the isotropic lobe of the same area.
+        alphas = np.array([m.alpha[0] * m.alpha[1] for m in materials]) ** 0.5
+        alpha = alphas[seen.index[which]]
+        tangent = shading_frames(seen.normal[which], seen.view[which])[:, 0]
+        inputs = {
+            "position": seen.position[which],
+            "normal": seen.normal[which],
+            "tangent": tangent,
+            "view": seen.view[which],
+            "alpha": np.stack([alpha, alpha], axis=-1),
         }
-        normal, view = (a / np.linalg.norm(a, axis=1, keepdims=True) for a in (normal, view))
-        mean = np.sqrt(alpha[:, 0] * alpha[:, 1])
-        specular, diffuse = exact_radiance(scene.lights, position, normal, view, mean)
-        self._truth = {"specular": specular, "diffuse": diffuse}
+        self._inputs = {
+            name: array.astype(np.float32).astype(np.float64) for name, array in inputs.items()
+        }
+
+    def _exact(self, scene: Scene, lobe: Lobe) -> dict[str, FloatArray]:
+        if lobe not in self._truth:
+            normal, view = (
+                array / np.linalg.norm(array, axis=1, keepdims=True)
+                for array in (self._inputs["normal"], self._inputs["view"])
+            )
+            specular, diffuse = exact_radiance(
+                scene.lights, self._inputs["position"], normal, view, self._inputs["alpha"][:, 0],
+                lobe,
+            )  # fmt: skip
+            self._truth[lobe] = {"specular": specular, "diffuse": diffuse}
+        return self._truth[lobe]
 
 
 def _measure(

@@ -1,13 +1,15 @@
-"""What the technique ``ltc`` converges to, in float64: the measure of all that approximate it.
+"""What the techniques converge to, in float64: the measure of all that approximate it.
 
-The same table, looked up as the shaders do, and the same lights, but their curves integrated
-to rounding (`ltc.bezier`). The difference to a picture is then what a way
-of integrating costs, and nothing else: not what the fitted lobe itself errs.
+For ``ltc`` and its kin it is the same table, looked up as the shaders do, and the same lights,
+but their curves integrated to rounding (`ltc.bezier`). The difference to a picture is then what
+a way of integrating costs, and nothing else: not what the fitted lobe itself errs. For
+``ggx`` it is GGX itself (`ltc.reference`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +18,11 @@ from app.outline import boundary
 from app.render.tables import isotropic_textures
 from app.scene import AreaLight
 from ltc import bezier, transform
+from ltc.reference import curve_specular_integral_batch
 from ltc.table import sample_textures
 
 FloatArray = NDArray[np.float64]
+Lobe: TypeAlias = Literal["ltc", "ggx"]
 
 BATCH = 512
 """Points at once: thousands of them with hundreds of curves would fill the memory."""
@@ -57,6 +61,7 @@ def exact_radiance(
     normal: ArrayLike,
     view: ArrayLike,
     alpha: ArrayLike,
+    lobe: Lobe = "ltc",
 ) -> tuple[FloatArray, FloatArray]:
     """Return what points of a white material send to their viewers.
 
@@ -66,6 +71,8 @@ def exact_radiance(
         World space, as for `app.render.renderer.Renderer.probe`; views above the surface.
     alpha : (n,) float
         GGX parameters.
+    lobe : {"ltc", "ggx"}
+        The fitted lobe, or GGX itself.
 
     Returns
     -------
@@ -82,6 +89,7 @@ def exact_radiance(
         matrix, albedo, _ = sample_textures(isotropic_textures(), a[part], cosine)
         inverse = transform.invert(matrix)
         gain = albedo / (1.0 - transform.leak(matrix))
+        local = np.einsum("nij,nj->ni", frames, wo[part])
         for light in lights:
             if not any(light.radiance):
                 continue
@@ -89,8 +97,11 @@ def exact_radiance(
             away = np.cross(light.plane.u, light.plane.v)
             front = (p[part] - np.array(light.plane.origin)) @ away > 0.0
             sign = np.where(front, 1.0, -1.0) * (front | light.two_sided)
-            lobe = gain * bezier.ltc_form_factor(inverse, contours).value
+            if lobe == "ltc":
+                share = gain * bezier.ltc_form_factor(inverse, contours).value
+            else:
+                share, _ = curve_specular_integral_batch(contours, local, a[part], a[part])
             lambert = bezier.form_factor(contours).value
-            specular[part] += np.maximum(sign * lobe, 0.0)[:, None] * light.radiance
+            specular[part] += np.maximum(sign * share, 0.0)[:, None] * light.radiance
             diffuse[part] += np.maximum(sign * lambert, 0.0)[:, None] * light.radiance
     return specular, diffuse

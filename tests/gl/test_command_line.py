@@ -147,7 +147,7 @@ def test_bench(folder: Path) -> None:
 
 
 def test_bench_compares_with_the_exact_integral(folder: Path) -> None:
-    """Per alpha and technique; none for ggx, which is another lobe, nor for the baseline."""
+    """Per alpha and technique: the fitted lobe's for all but ggx, which has GGX itself."""
     curved = json.loads((folder / "lit.json").read_text())
     h = 0.5522847498
     curved["lights"][0]["outline"] = {"contours": [{"bezier": [
@@ -168,7 +168,7 @@ def test_bench_compares_with_the_exact_integral(folder: Path) -> None:
         ("no shading", None), *((name, alpha) for alpha in (0.1, 0.3) for name in techniques),
     ]  # fmt: skip
     for row in rows:
-        if row["technique"] in ("no shading", "ggx:3"):
+        if row["technique"] == "no shading":
             assert row["errors"] == {}
             continue
         for lobe in ("specular", "diffuse"):
@@ -176,6 +176,10 @@ def test_bench_compares_with_the_exact_integral(folder: Path) -> None:
             assert errors["points"] == 200
             assert 0.0 <= errors["mean"] <= errors["max"]
             assert errors["p95"] <= errors["max"]
+        if row["technique"] == "ggx:3":
+            # Its weights' error on rough floors is 2e-4 on average and 7e-3 at most (docs/ggx.md).
+            assert row["errors"]["specular"]["mean"] < 2e-3
+            continue
         # Four edges a quarter lose 2.6 % of a circle's area, 128 lose 3e-5.
         specular = row["errors"]["specular"]["max"]
         assert specular > 2e-3 if row["technique"] == "uniform:4" else specular < 5e-4

@@ -21,6 +21,7 @@ from app.scene import (
 )
 from ltc.bezier import flatten
 from ltc.polygon import loops_form_factor, ltc_specular, positive_winding
+from ltc.reference import specular_integral_batch
 from ltc.table import sample_textures
 
 LAMP = AreaLight("l", ring(), Plane((0.0, 1.0, -1.0)), (3.0, 2.0, 1.0), visible=False)
@@ -106,3 +107,24 @@ def test_exact_radiance_is_that_of_polygons_with_very_many_edges():
         (diffuse[:, 0], loops_form_factor(loops)),
     ):
         np.testing.assert_allclose(got, np.where(front, np.maximum(want, 0.0), 0.0), atol=2e-6)
+
+
+def test_ggx_itself_is_that_of_fine_polygons():
+    rng = np.random.default_rng(8)
+    n = 6
+    position = np.column_stack([rng.uniform(-1.0, 1.0, n), np.zeros(n), rng.uniform(-0.5, 1.0, n)])
+    normal = np.tile([0.0, 1.0, 0.0], (n, 1))
+    view = rng.normal(size=(n, 3)) + np.array([0.0, 2.0, 1.0])
+    view /= np.linalg.norm(view, axis=1, keepdims=True)
+    alpha = rng.uniform(0.1, 0.6, n)
+    lamp = AreaLight("l", disk(0.5), Plane((0.0, 1.0, -1.0)))
+    specular, _ = exact_radiance([lamp], position, normal, view, alpha, "ggx")
+    frames = shading_frames(normal, view)
+    (curves,) = boundary(lamp.outline)
+    loop = flatten(curves, 20)
+    world = positive_winding(np.column_stack([loop, np.zeros(len(loop))]) + lamp.plane.origin)
+    local = np.einsum("nij,nkj->nki", frames, world - position[:, None])
+    wo = np.einsum("nij,nj->ni", frames, view)
+    want, _ = specular_integral_batch(local, wo, alpha, alpha)
+    # 240 edges around a circle lose 1e-4 of its area.
+    np.testing.assert_allclose(specular[:, 0], want, rtol=3e-4, atol=1e-6)

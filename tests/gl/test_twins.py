@@ -77,7 +77,6 @@ GPU_ONLY = {
     "panel_middle": THROUGH_CURVES,
     "halve_panel": THROUGH_CURVES,
     "next_panel": THROUGH_CURVES,
-    "node_pair": THROUGH_CURVES,
     "curve_integral": THROUGH_CURVES,
     "add_curve": THROUGH_CURVES,
     "lobe_density": THROUGH_CURVES,
