@@ -2,7 +2,8 @@
 
 While something moves, each frame shows one fresh sample, smaller where a
 full-size one takes longer than `SLOW`. When nothing moves, samples gather up to
-the wanted number, and then no pass runs at all.
+the wanted number, and then no pass runs at all. Slow ones wait while the user
+moves the mouse or types: the window answers at once, the picture has time.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ SETTLE = 0.2
 """Seconds without movement after which a smaller picture becomes full-size; more, up to
 `LONGEST_SETTLE`, where a full-size sample takes longer than that."""
 LONGEST_SETTLE = 1.0
+
+KEYS = tuple(key for key in imgui.Key if imgui.Key.tab <= key < imgui.Key.gamepad_start)
+"""Those of the keyboard."""
 
 SMALLEST = 4
 """Most that width and height of a moving picture are divided by."""
@@ -71,6 +75,7 @@ class LivePicture:
         self._full_size_seconds = 0.0
         self._divisor = 1
         self._changed_at = 0.0
+        self._touched_at = 0.0
 
     @property
     def has_failed(self) -> bool:
@@ -101,6 +106,8 @@ class LivePicture:
             Of the picture at full size.
         """
         now = time.monotonic()
+        if _is_touched():
+            self._touched_at = now
         if self._wanted is None or _other_radiance(self._wanted, scene):
             self._changed_at = now
         self._wanted = scene
@@ -116,7 +123,9 @@ class LivePicture:
         shot = Shot(self._shown[2], replace(settings, samples=1), width, height)
         if shot == self._failed:
             return
-        if shot == self.shot and self.samples[0] >= settings.samples:
+        is_slow = self._full_size_seconds > SLOW
+        waits = is_slow and now - self._touched_at < SETTLE and self.samples[0] > 0
+        if shot == self.shot and (waits or self.samples[0] >= settings.samples):
             return
         try:
             began = time.perf_counter()
@@ -153,6 +162,13 @@ class LivePicture:
             texture.filter = (kind, kind)
         reference = imgui.ImTextureRef(texture.glo)
         draw.add_image(reference, low, high, ImVec2(0.0, 1.0), ImVec2(1.0, 0.0))
+
+
+def _is_touched() -> bool:
+    """Tell whether the user does something in this frame: mouse, wheel or any key."""
+    io = imgui.get_io()
+    moved = io.mouse_delta.x or io.mouse_delta.y or io.mouse_wheel or io.mouse_wheel_h
+    return bool(moved) or imgui.is_any_mouse_down() or any(map(imgui.is_key_down, KEYS))
 
 
 def _other_radiance(a: Scene, b: Scene) -> bool:
