@@ -22,8 +22,8 @@ What differs from the published shader, because it lost light there:
 The extrapolated leaf. The area between an arc and its chord falls by four when the arc is
 halved, up to terms of the next order. With I01, I12 the chords of the halves and I20 the
 chord back, the arc is therefore (I01 + I12) + (I01 + I12 + I20)/3, Richardson's
-extrapolation of numbers that the published method computes anyway. On outlines like
-those of the tests it errs a hundred times less for the same edges.
+extrapolation of numbers that the published method computes anyway. On the outlines of
+the tests it errs 50 to 90 times less for the same edges.
 
 Counter-clockwise about +z is positive, as in `ltc.polygon`.
 """
@@ -50,8 +50,8 @@ DIFFUSE_EPSILON = 1000.0
 """The paper's threshold for diffuse light: no interval is halved more than once."""
 
 MAX_LEVEL = 10
-"""Halvings of one of the first intervals: 4 times 2,048 edges a curve, the paper's worst case
-being a point on the outline itself, where no triangle ever becomes small."""
+"""Halvings of one of the first intervals: at most 4 times 2,048 edges a curve. A point on the
+outline itself needs a bound, because no triangle there ever becomes small."""
 
 STRAIGHT = 1e-12
 """Distance of a straight curve's handles from its chord, over its length: rounding."""
@@ -121,7 +121,9 @@ def adaptive(
 
     Notes
     -----
-    Kuge et al. 2022, listings 1 and 2. Twin: ``shaders/ltc/adaptive.glsl``.
+    Kuge et al. 2022, listings 1 and 2. Twin: ``shaders/ltc/adaptive.glsl``, which keeps
+    epsilon at 1e-6 or more, what float32 can tell; probed radiance agrees to 3e-5, 95 of 100
+    to 2e-6, for alpha from .01.
     """
     if divisions < 1:
         raise ValueError(f"divisions is {divisions}, expected 1 or more")

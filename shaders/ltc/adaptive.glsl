@@ -1,10 +1,10 @@
 // Curves by straight edges, as published, for comparison. Twin: ltc.adaptive.
 //
 // CURVE_RULE 1 halves a curve's intervals until the triangle between a chord and the chords of
-// its halves adds little to the form factor (Kuge et al. 2022, listing 1); 2 is the same
-// with leaves extrapolated to the curve. Instead of the
-// published stack a counter walks the intervals: `index` of those `level` halvings
-// deep, from left to right, which needs no memory and cannot overflow.
+// its halves adds little to the form factor (Kuge et al. 2022, listing 1); 2 is the same with
+// leaves extrapolated to the curve. Instead of the published stack a counter walks the
+// intervals: `index` of those `level` halvings deep, from left to right, which needs no
+// memory and cannot overflow.
 // A chord's way is taken from the powers of t, where nothing cancels.
 
 #include "ltc/curve.glsl"
