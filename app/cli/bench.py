@@ -91,7 +91,8 @@ class Row:
     """One measured shot: ``passes`` by name, and ``wall``, the whole frame with a glFinish.
 
     ``alpha`` is what all materials were given, None where they keep their own; ``errors``
-    are those of specular and diffuse radiance, empty where none were asked for.
+    are those of specular and diffuse radiance, empty where none were asked for; so are
+    ``evaluations`` of the contour integral, their mean over pixels that show surfaces.
     """
 
     scene: str
@@ -100,6 +101,7 @@ class Row:
     passes: dict[str, Quartiles]
     wall: Quartiles
     errors: dict[str, Errors]
+    evaluations: float | None
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,8 @@ def bench(
 
     --error adds how far each technique is from the integral that it approximates:
     mean, 95th percentile and largest error of specular and diffuse radiance, of
-    lights with radiance 1 on a white material.
+    lights with radiance 1 on a white material; and how often a pixel evaluates the
+    integral along the outlines, which no other program on the machine can disturb.
 
     \b
     Examples:
@@ -195,8 +198,13 @@ def bench(
         with Steps("measuring", len(jobs) * (warm_up + repeats)) as steps:
             for job in jobs:
                 passes, wall = _measure(ctx, renderer, job.shot, warm_up, repeats, steps)
-                errors = exact.errors(job) if points and job.technique != BASELINE else {}
-                rows.append(Row(job.scene, job.technique, job.alpha, passes, wall, errors))
+                errors, evaluations = {}, None
+                if points and job.technique != BASELINE:
+                    errors = exact.errors(job)
+                    evaluations = _evaluations(renderer, job.shot)
+                rows.append(
+                    Row(job.scene, job.technique, job.alpha, passes, wall, errors, evaluations)
+                )
         source = renderer.timing_source
         version = str(ctx.info["GL_VERSION"])
     console = results()
@@ -250,6 +258,13 @@ def _jobs(
 def _with_materials(scene: Scene, **changes: Any) -> Scene:
     materials: tuple[Material, ...] = tuple(replace(m, **changes) for m in scene.materials)
     return replace(scene, materials=materials)
+
+
+def _evaluations(renderer: Renderer, shot: Shot) -> float | None:
+    """Return how often a pixel that shows a surface evaluates the contour integral, on average."""
+    renderer.render(replace(shot, settings=replace(shot.settings, view="cost")))
+    pixels = len(renderer.surfaces().index)
+    return float(renderer.radiance()[..., 0].sum(dtype=np.float64)) / pixels if pixels else None
 
 
 class Exact:
@@ -358,7 +373,10 @@ def _table(rows: list[Row], title: str) -> Table:
     lobes = list(dict.fromkeys(lobe for row in rows for lobe in row.errors))
     for lobe in lobes:
         table.add_column(f"{lobe} error: mean, p95, max", justify="right", no_wrap=True)
+    if lobes:
+        table.add_column("evaluations", justify="right", no_wrap=True)
     for row in rows:
+        count = "-" if row.evaluations is None else f"{row.evaluations:.1f}"
         table.add_row(
             Path(row.scene).stem,
             row.technique,
@@ -367,6 +385,7 @@ def _table(rows: list[Row], title: str) -> Table:
             _cell(row.wall),
             str(row.wall.repeats),
             *(_error_cell(row.errors.get(lobe)) for lobe in lobes),
+            *([count] if lobes else []),
         )
     return table
 
