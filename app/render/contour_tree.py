@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from app.curves import derivative, evaluate, is_straight, signed_areas, split
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 LARGEST_TURN = np.pi / 4.0 * 1.01
 """By how much the control polygon of a leaf turns at most [rad]; an eighth of a circle passes."""
@@ -65,22 +66,29 @@ class TreeNodes:
     disc: FloatArray
     area: FloatArray
     signed_area: FloatArray
-    skip: NDArray[np.int64]
+    skip: IntArray
     is_leaf: NDArray[np.bool_]
 
 
 def contour_tree(loops: Sequence[FloatArray]) -> TreeNodes:
     """Return the tree of closed loops, each (k, 4, 2) float64 with k >= 1."""
-    builder = _Builder()
-    builder.loops([_leaves(loop) for loop in loops])
-    count = len(builder.area)
+    leaves, counts = _leaves(loops)
+    shape = _Shape.over(counts)
+    first, end = np.array(shape.first), np.array(shape.end)
+    start, stop = leaves[first, 0], leaves[end - 1, 3]
+    # A group of loops has no chord: it ends where it starts.
+    stop[shape.is_group] = start[shape.is_group]
+    is_leaf = end - first == 1
+    curves = np.stack([start, np.zeros_like(start), np.zeros_like(start), stop], axis=1)
+    curves[is_leaf] = leaves[first[is_leaf]]
+    before = np.concatenate([[0.0], np.cumsum(signed_areas(leaves))])
     return TreeNodes(
-        np.array(builder.curves).reshape(count, 4, 2),
-        np.array(builder.disc).reshape(count, 3),
-        np.array(builder.area),
-        np.array(builder.signed_area),
-        np.array(builder.skip, dtype=np.int64),
-        np.array(builder.is_leaf, dtype=bool),
+        curves,
+        _discs(leaves, first, end, np.array(shape.depth)),
+        _area_bounds(leaves, shape, stop - start),
+        before[end] - before[first] + 0.5 * _cross(stop, start),
+        np.array(shape.skip),
+        is_leaf,
     )
 
 
@@ -119,21 +127,20 @@ def turn(curves: FloatArray) -> FloatArray:
     return total
 
 
-def _leaves(loop: FloatArray) -> FloatArray:
-    """Return a loop cut into pieces that turn little, (n, 4, 2), in order."""
-    pieces = np.array(loop, dtype=np.float64)
+def _leaves(loops: Sequence[FloatArray]) -> tuple[FloatArray, list[int]]:
+    """Return loops cut into pieces that turn little: (n, 4, 2) in order, and each loop's number."""
+    pieces = np.concatenate(loops)
+    owner = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
     for _ in range(MOST_SPLITS):
         bent = (turn(pieces) > LARGEST_TURN) & ~is_straight(pieces)
         if not bent.any():
             break
-        halves = np.stack(split(pieces, 0.5), axis=1)
+        halves = split(pieces[bent], 0.5)
         counts = np.where(bent, 2, 1)
-        first = np.cumsum(counts) - counts
-        cut = np.empty((int(counts.sum()), 4, 2))
-        cut[first] = np.where(bent[:, None, None], halves[:, 0], pieces)
-        cut[first[bent] + 1] = halves[bent, 1]
-        pieces = cut
-    return pieces
+        place = (np.cumsum(counts) - counts)[bent]
+        pieces, owner = np.repeat(pieces, counts, axis=0), np.repeat(owner, counts)
+        pieces[place], pieces[place + 1] = halves
+    return pieces, np.bincount(owner, minlength=len(loops)).tolist()
 
 
 def _unsigned_areas(curves: FloatArray) -> FloatArray:
@@ -145,59 +152,94 @@ def _unsigned_areas(curves: FloatArray) -> FloatArray:
     return np.asarray(0.25 * AREA_MARGIN * (swept @ AREA_WEIGHTS))
 
 
-class _Builder:
-    """Collects nodes in depth-first order."""
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
-    def __init__(self) -> None:
-        self.curves: list[FloatArray] = []
-        self.disc: list[FloatArray] = []
-        self.area: list[float] = []
-        self.signed_area: list[float] = []
-        self.skip: list[int] = []
-        self.is_leaf: list[bool] = []
 
-    def loops(self, loops: Sequence[FloatArray]) -> float:
-        """Add a group of loops; return its area bound. Its chord has no length."""
-        if len(loops) == 1:
-            loop = loops[0]
-            straight = is_straight(loop)
-            areas = np.where(straight, 0.0, _unsigned_areas(loop))
-            return self._run(loop, areas)
-        place = self._open(np.concatenate(loops), loops[0][0, 0], loops[0][0, 0])
-        return self._close(place, sum(self.loops(loops[run]) for run in _runs(len(loops))))
+@dataclass
+class _Shape:
+    """Which leaves each node of the tree spans, ``first`` to ``end``, in depth-first order."""
 
-    def _run(self, leaves: FloatArray, areas: FloatArray) -> float:
-        """Add consecutive leaves; return a bound of the area between them and their chord."""
-        if len(leaves) == 1:
-            place = self._open(leaves, leaves[0, 0], leaves[0, 3])
-            self.curves[place] = leaves[0]
-            self.is_leaf[place] = True
-            return self._close(place, float(areas[0]))
-        start = leaves[0, 0]
-        place = self._open(leaves, start, leaves[-1, 3])
-        runs = _runs(len(leaves))
-        ends = np.array([leaves[run][-1, 3] for run in runs]) - start
-        inner = sum(self._run(leaves[run], areas[run]) for run in runs)
-        # Between the node's chord and those of its children lie triangles.
-        cross = ends[:-1, 0] * ends[1:, 1] - ends[:-1, 1] * ends[1:, 0]
-        return self._close(place, inner + 0.5 * float(np.abs(cross).sum()))
+    first: list[int]
+    end: list[int]
+    depth: list[int]
+    skip: list[int]
+    is_group: list[bool]
 
-    def _open(self, leaves: FloatArray, start: FloatArray, end: FloatArray) -> int:
-        points = leaves.reshape(-1, 2)
-        center = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        radius = np.sqrt(((points - center) ** 2).sum(axis=1).max())
-        self.curves.append(np.array([start, (0.0, 0.0), (0.0, 0.0), end]))
-        self.disc.append(np.array([*center, radius]))
-        self.area.append(0.0)
-        self.signed_area.append(float(np.sum(signed_areas(leaves - start))))
+    @classmethod
+    def over(cls, counts: Sequence[int]) -> _Shape:
+        """Return the tree over loops of so many leaves each."""
+        shape = cls([], [], [], [], [])
+        bounds = np.concatenate([[0], np.cumsum(counts)]).tolist()
+        shape._add_loops(bounds, 0)
+        return shape
+
+    def _add_loops(self, bounds: Sequence[int], depth: int) -> None:
+        if len(bounds) == 2:
+            self._add_run(bounds[0], bounds[1], depth)
+            return
+        place = self._open(bounds[0], bounds[-1], depth, is_group=True)
+        for run in _runs(len(bounds) - 1):
+            self._add_loops(bounds[run.start : run.stop + 1], depth + 1)
+        self.skip[place] = len(self.first)
+
+    def _add_run(self, first: int, end: int, depth: int) -> None:
+        place = self._open(first, end, depth, is_group=False)
+        if end - first > 1:
+            for run in _runs(end - first):
+                self._add_run(first + run.start, first + run.stop, depth + 1)
+        self.skip[place] = len(self.first)
+
+    def _open(self, first: int, end: int, depth: int, *, is_group: bool) -> int:
+        self.first.append(first)
+        self.end.append(end)
+        self.depth.append(depth)
         self.skip.append(0)
-        self.is_leaf.append(False)
-        return len(self.area) - 1
+        self.is_group.append(is_group)
+        return len(self.first) - 1
 
-    def _close(self, place: int, area: float) -> float:
-        self.area[place] = area
-        self.skip[place] = len(self.area)
-        return area
+    def children(self, node: int) -> list[int]:
+        """Return the nodes right below a node."""
+        found, child = [], node + 1
+        while child < self.skip[node]:
+            found.append(child)
+            child = self.skip[child]
+        return found
+
+
+def _discs(leaves: FloatArray, first: IntArray, end: IntArray, depth: IntArray) -> FloatArray:
+    """Return discs (m, 3) around the control points of nodes that span leaves."""
+    low, high = leaves.min(axis=1), leaves.max(axis=1)
+    discs = np.zeros((len(first), 3))
+    for level in range(int(depth.max()) + 1):
+        # Nodes of one level span leaves side by side, but not all leaves.
+        nodes = np.flatnonzero(depth == level)
+        counts = (end - first)[nodes]
+        starts = np.cumsum(counts) - counts
+        spanned = np.arange(counts.sum()) + np.repeat(first[nodes] - starts, counts)
+        center = 0.5 * np.minimum.reduceat(low[spanned], starts, axis=0)
+        center += 0.5 * np.maximum.reduceat(high[spanned], starts, axis=0)
+        away = leaves[spanned] - np.repeat(center, counts, axis=0)[:, None]
+        reach = np.maximum.reduceat((away**2).sum(axis=-1).max(axis=1), starts)
+        discs[nodes] = np.column_stack([center, np.sqrt(reach)])
+    return discs
+
+
+def _area_bounds(leaves: FloatArray, shape: _Shape, chords: FloatArray) -> FloatArray:
+    """Return at least the area between each node and its chord, (m,)."""
+    areas = np.where(is_straight(leaves), 0.0, _unsigned_areas(leaves))
+    bounds = np.zeros(len(shape.first))
+    for node in reversed(range(len(bounds))):
+        below = shape.children(node)
+        if not below:
+            bounds[node] = areas[shape.first[node]]
+            continue
+        bounds[node] = bounds[below].sum()
+        if not shape.is_group[node]:
+            # Between the node's chord and those of its children lie triangles.
+            ends = np.cumsum(chords[below], axis=0)
+            bounds[node] += 0.5 * np.abs(_cross(ends[:-1], ends[1:])).sum()
+    return bounds
 
 
 def _runs(count: int) -> list[slice]:
