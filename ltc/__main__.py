@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ltc.fit import CONFIGURATIONS, SIZE, checkpoint_path, fit_isotropic
+from ltc.fit import CONFIGURATIONS, SIZE, fit_isotropic
+from ltc.fitting import checkpoint_path
 
 
 class _Parser(argparse.ArgumentParser):

@@ -49,13 +49,13 @@ import json
 import os
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
 from ltc.resources import resource_path
@@ -73,6 +73,7 @@ RESIDUAL_SIZE, ALBEDO_SIZE = 16, 64
 """Texels on each axis of the textures that the GPU samples."""
 
 _ALPHA_LIMIT = 1e-6  # stands for alpha = 0 in the first column: entries differ by about as much
+_ARRAYS = ("residual", "albedo", "fresnel")
 _TILT = 0.7  # see closed_form_guess
 
 
@@ -509,6 +510,81 @@ def npz_bytes(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     return buffer.getvalue()
 
 
+def save_arrays(
+    path: str | Path,
+    arrays: Mapping[str, NDArray[Any]],
+    file_format: str,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Write a table's arrays and provenance to an npz file, atomically.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    text = json.dumps({"format": file_format, **provenance}, indent=1, sort_keys=True)
+    record = np.frombuffer(text.encode(), dtype=np.uint8)
+    write_atomically(Path(path), npz_bytes({**arrays, "provenance": record}))
+
+
+def load_arrays(
+    file: Path, expected: Sequence[str], dtype: DTypeLike, file_format: str, what: str
+) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Return the arrays and the provenance of a file that `save_arrays` wrote.
+
+    Parameters
+    ----------
+    file : Path
+    expected : sequence of str
+        Names of the arrays.
+    dtype : dtype
+        What all of them must be.
+    file_format : str
+        What the file must say that it is.
+    what : str
+        The same in words, for messages.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If the file is damaged or something else, in one sentence.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    data = file.read_bytes()
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            names = archive.namelist()
+    except zipfile.BadZipFile as error:
+        raise ValueError(
+            f"{file}: not an npz archive ({len(data)} bytes, {error}), expected {what}"
+        ) from None
+    for name in (*expected, "provenance"):
+        if f"{name}.npy" not in names:
+            found = ", ".join(sorted(n.removesuffix(".npy") for n in names)) or "nothing"
+            raise ValueError(f"{file}: array '{name}' is missing, found {found}")
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as archive_arrays:
+                arrays[name] = archive_arrays[name]
+        except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+            raise ValueError(f"{file}: array '{name}' cannot be read ({error})") from None
+    for name in expected:
+        if arrays[name].dtype != dtype:
+            raise ValueError(
+                f"{file}: array '{name}' is {arrays[name].dtype}, expected {np.dtype(dtype)}"
+            )
+    try:
+        provenance = json.loads(arrays.pop("provenance").astype(np.uint8).tobytes())
+    except ValueError:
+        raise ValueError(f"{file}: provenance is not JSON text, expected an object") from None
+    found_format = provenance.pop("format", None) if isinstance(provenance, dict) else None
+    if found_format != file_format:
+        raise ValueError(f"{file}: format is {found_format!r}, expected {file_format!r}")
+    return arrays, provenance
+
+
 def save_isotropic(table: IsotropicTable, path: str | Path) -> None:
     """Write a table to an npz file, atomically; the same table gives the same bytes.
 
@@ -517,18 +593,8 @@ def save_isotropic(table: IsotropicTable, path: str | Path) -> None:
     OSError
         If the file cannot be written.
     """
-    provenance = json.dumps({"format": FORMAT, **table.provenance}, indent=1, sort_keys=True)
-    write_atomically(
-        Path(path),
-        npz_bytes(
-            {
-                "residual": table.residual.astype("<f4"),
-                "albedo": table.albedo.astype("<f4"),
-                "fresnel": table.fresnel.astype("<f4"),
-                "provenance": np.frombuffer(provenance.encode(), dtype=np.uint8),
-            }
-        ),
-    )
+    arrays = {name: getattr(table, name).astype("<f4") for name in _ARRAYS}
+    save_arrays(path, arrays, FORMAT, table.provenance)
 
 
 def load_isotropic(path: str | Path | None = None) -> IsotropicTable:
@@ -548,34 +614,7 @@ def load_isotropic(path: str | Path | None = None) -> IsotropicTable:
         file, what was found and what was expected.
     """
     file = resource_path("luts", "ltc_isotropic.npz") if path is None else Path(path)
-    arrays: dict[str, NDArray[Any]] = {}
-    data = file.read_bytes()
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            names = archive.namelist()
-    except zipfile.BadZipFile as error:
-        raise ValueError(
-            f"{file}: not an npz archive ({len(data)} bytes, {error}), expected an isotropic table"
-        ) from None
-    for name in ("residual", "albedo", "fresnel", "provenance"):
-        if f"{name}.npy" not in names:
-            found = ", ".join(sorted(n.removesuffix(".npy") for n in names)) or "nothing"
-            raise ValueError(f"{file}: array '{name}' is missing, found {found}")
-        try:
-            with np.load(io.BytesIO(data), allow_pickle=False) as archive_arrays:
-                arrays[name] = archive_arrays[name]
-        except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-            raise ValueError(f"{file}: array '{name}' cannot be read ({error})") from None
-    for name in ("residual", "albedo", "fresnel"):
-        if arrays[name].dtype != np.float32:
-            raise ValueError(f"{file}: array '{name}' is {arrays[name].dtype}, expected float32")
-    try:
-        provenance = json.loads(arrays["provenance"].astype(np.uint8).tobytes())
-    except ValueError:
-        raise ValueError(f"{file}: provenance is not JSON text, expected an object") from None
-    found_format = provenance.pop("format", None) if isinstance(provenance, dict) else None
-    if found_format != FORMAT:
-        raise ValueError(f"{file}: format is {found_format!r}, expected {FORMAT!r}")
+    arrays, provenance = load_arrays(file, _ARRAYS, np.float32, FORMAT, "an isotropic table")
     try:
         return IsotropicTable(arrays["residual"], arrays["albedo"], arrays["fresnel"], provenance)
     except ValueError as error:

@@ -9,10 +9,18 @@ import pytest
 from numpy.typing import NDArray
 
 from ltc import __main__ as command_line
-from ltc import fit, transform
-from ltc.fit import CheckpointError, Configurations, fit_isotropic
+from ltc import fit, fitting, objective, transform
+from ltc.fit import fit_isotropic
+from ltc.fitting import CheckpointError
+from ltc.objective import Configurations, Lobe, ShadingError
 from ltc.polygon import clipped_form_factor, ltc_specular
-from ltc.table import IsotropicTable, load_isotropic, residual_matrix, sample_textures
+from ltc.table import (
+    IsotropicTable,
+    closed_form_guess,
+    load_isotropic,
+    residual_matrix,
+    sample_textures,
+)
 
 FloatArray = NDArray[np.float64]
 SETTINGS = {"size": 4, "seed": 3, "configurations": 48}
@@ -28,14 +36,19 @@ def cheap(monkeypatch: pytest.MonkeyPatch, shipped: IsotropicTable) -> None:
     """Leave out what is slow and tested elsewhere: exact albedo, the final figures."""
     monkeypatch.setattr(fit, "albedo_tables", lambda: (shipped.albedo, shipped.fresnel))
     monkeypatch.setattr(fit, "measure", lambda table, seed: {"rectangles": {}, "octagons": {}})
-    monkeypatch.setattr(fit, "_CHUNK", 16)
+    monkeypatch.setattr(fitting, "CHUNK", 16)
 
 
 def _direct(cases: Configurations, exact: FloatArray, A: FloatArray, X: FloatArray) -> FloatArray:
     """Return the technique's error by `ltc.polygon`, entry by entry."""
-    guess = fit.closed_form_guess(cases.alpha, cases.alpha, cases.wo)
+    guess = closed_form_guess(cases.alpha, cases.alpha, cases.wo)
     M = guess @ residual_matrix(X, np.ones(len(X)))
     return ltc_specular(M, [cases.corners], A) - exact
+
+
+def _plain(count: int) -> FloatArray:
+    """Return the basis of entries that are X00, X02, X11 and X20 themselves."""
+    return fit.entry_basis(np.ones(count))
 
 
 class TestConfigurations:
@@ -70,7 +83,7 @@ class TestDerivatives:
     def test_shading(self, rng: np.random.Generator) -> None:
         cases = fit.random_configurations(rng, 400, training=True)
         exact, A = rng.random(400), rng.uniform(0.5, 1.0, 400)
-        shading = fit.ShadingError(cases, exact, A)
+        shading = ShadingError(cases, exact, A, _plain(400))
         X = rng.normal(scale=0.1, size=(400, 4))
         error, slope = shading.evaluate(X, slice(None))
         np.testing.assert_allclose(error, _direct(cases, exact, A, X), atol=1e-10)
@@ -84,7 +97,7 @@ class TestDerivatives:
 
     def test_parts_are_the_whole(self, rng: np.random.Generator) -> None:
         cases = fit.random_configurations(rng, 50)
-        shading = fit.ShadingError(cases, np.zeros(50), np.ones(50))
+        shading = ShadingError(cases, np.zeros(50), np.ones(50), _plain(50))
         whole = shading.evaluate(np.zeros((50, 4)), slice(None))
         part = shading.evaluate(np.zeros((20, 4)), slice(10, 30))
         np.testing.assert_array_equal(whole[0][10:30], part[0])
@@ -92,25 +105,27 @@ class TestDerivatives:
 
     def test_share_above_the_horizon(self, rng: np.random.Generator) -> None:
         cases = fit.random_configurations(rng, 50)
-        guess = fit.closed_form_guess(cases.alpha, cases.alpha, cases.wo)
+        guess = closed_form_guess(cases.alpha, cases.alpha, cases.wo)
         X = rng.normal(scale=0.1, size=(50, 4))
-        model = fit._Model(guess, X)
+        basis = _plain(50)
+        model = Lobe(guess, basis, X)
         M = guess @ residual_matrix(X, np.ones(50))
         np.testing.assert_allclose(model.above, 1.0 - transform.leak(M), atol=1e-14)
         for i in range(4):
             step = np.zeros(4)
             step[i] = 1e-6
-            high, low = fit._Model(guess, X + step).above, fit._Model(guess, X - step).above
+            high, low = Lobe(guess, basis, X + step).above, Lobe(guess, basis, X - step).above
             np.testing.assert_allclose(model.above_gradient()[:, i], (high - low) / 2e-6, atol=1e-7)
 
-    def test_total_variation(self) -> None:
-        lobes = fit.LobeVariation(np.random.default_rng(2), 20, 4000)
+    def test_total_variation(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(fit, "_DIRECTIONS", 4000)
+        lobes, _ = fit.random_variation(np.random.default_rng(2), 20)
         # Both densities are normalised above the horizon: the estimate of the integral
         # of each must be 1, and the variation between 0 and 1 per view.
         np.testing.assert_allclose(np.sum(2.0 * lobes.ggx * lobes.weight, axis=1), 1.0)
         X = np.zeros((20, 4))
         loss, _, slope = lobes.normal_equations(X, slice(None))
-        assert 0.01 < loss / fit._VARIATION < 0.3
+        assert 0.01 < loss / objective.VARIATION_WEIGHT < 0.3
         for i in range(4):
             step = np.zeros(4)
             step[i] = 1e-4
@@ -176,7 +191,7 @@ class TestFitting:
     def test_interrupted_it_continues_to_the_same_result(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, after: int
     ) -> None:
-        monkeypatch.setattr(fit, "_SAVE_EVERY", 0.0)  # report after every chunk
+        monkeypatch.setattr(fitting, "SAVE_EVERY", 0.0)  # report after every chunk
         fit_isotropic(tmp_path / "whole.npz", **SETTINGS)
         output = tmp_path / "out.npz"
         output.write_bytes(b"old")
@@ -191,11 +206,11 @@ class TestFitting:
         with pytest.raises(KeyboardInterrupt):
             fit_isotropic(output, **SETTINGS, report=_interrupt(stage, after))
         assert output.read_bytes() == b"old"
-        assert fit.checkpoint_path(output).exists()
+        assert fitting.checkpoint_path(output).exists()
         fit_isotropic(output, **SETTINGS, resume=True)
         assert output.read_bytes() == (tmp_path / "whole.npz").read_bytes()
         assert work["integrals"] == SETTINGS["configurations"]
-        assert not fit.checkpoint_path(output).exists()
+        assert not fitting.checkpoint_path(output).exists()
 
     def test_an_interrupt_amid_the_integrals_loses_one_chunk(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -224,7 +239,7 @@ class TestFitting:
             fit_isotropic(output, **SETTINGS, report=_interrupt("fit: step", 1))
         with pytest.raises(CheckpointError, match=r"seed 3.*expected.*seed 4.*--fresh"):
             fit_isotropic(output, **(SETTINGS | {"seed": 4}))
-        checkpoint = fit.checkpoint_path(output)
+        checkpoint = fitting.checkpoint_path(output)
         checkpoint.write_bytes(checkpoint.read_bytes()[:100])
         with pytest.raises(CheckpointError, match=r"damaged.*--fresh"):
             fit_isotropic(output, **SETTINGS)
