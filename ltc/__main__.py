@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ltc import check_command
 from ltc.fit import CONFIGURATIONS, SIZE, fit_isotropic
 from ltc.fitting import checkpoint_path
 
@@ -50,6 +51,7 @@ def _parser() -> _Parser:
         "--resume", action="store_true", help="insist on continuing an interrupted fit"
     )
     again.add_argument("--fresh", action="store_true", help="discard an interrupted fit")
+    check_command.add_parser(commands)
     return parser
 
 
@@ -93,6 +95,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     try:
+        if parsed.command == "check":
+            return check_command.run(parsed)
         return _fit_isotropic(parsed)
     except ValueError as error:
         print(f"python -m ltc: {error}", file=sys.stderr)
