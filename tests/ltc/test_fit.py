@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ltc import __main__ as command_line
-from ltc import fit, fitting, objective, transform
+from ltc import fit, fit_command, fitting, objective, transform
 from ltc.fit import fit_isotropic
 from ltc.fitting import CheckpointError
 from ltc.objective import Configurations, Lobe, ShadingError
@@ -263,7 +263,7 @@ class TestFitting:
         arguments = ["fit", "isotropic", "--output", str(output), "--size", "4", "--seed", "3"]
         arguments += ["--configurations", "48"]
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(command_line, "_print_error", lambda figures: None)
+            patch.setattr(fit_command, "_print_error", lambda figures: None)
             assert command_line.main(arguments) == 0
         out, err = capsys.readouterr()
         assert str(output) in out
@@ -343,7 +343,7 @@ class TestCommandLine:
         def interrupted(*_: object) -> None:
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(command_line, "fit_isotropic", interrupted)
+        monkeypatch.setattr(fit_command, "fit_isotropic", interrupted)
         assert command_line.main(["fit", "isotropic", "--output", str(tmp_path / "x.npz")]) == 130
         assert "the same command continues from" in capsys.readouterr().err
 
