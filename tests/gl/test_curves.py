@@ -313,6 +313,14 @@ STIFF = {
     ],
     "overshooting line": [curve((-1, -1), (3, -1), (-3, -1), (1, -1)), *TRIANGLE],
     "raised quadratic": [curve((-1, 0), (-1 / 3, 2 / 3), (1 / 3, 2 / 3), (1, 0)), BASE],
+    "corner without handles": [
+        curve((-0.5, 0), (-0.5, 0), (0, 0), (0, -0.5)),
+        line_as_cubic((0, -0.5), (-0.5, 0)),
+    ],
+    "near a cusp": [
+        curve((-0.8, 0), (-0.2, 0.6), (-0.7, -0.3), (-0.6, -0.9)),
+        line_as_cubic((-0.6, -0.9), (-0.8, 0)),
+    ],
     "needle": [curve((-1, 0), (-0.3, 1e-4), (0.3, 1e-4), (1, 0)), BASE],
 }
 
