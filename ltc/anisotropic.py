@@ -15,7 +15,8 @@ Frame
 
 Axes, in the order of the arrays, each over [0, 1] with nodes at ``i / (n - 1)``
     0  azimuth   |v_b| / (|v_a| + |v_b|), a the axis of the larger alpha
-    1  ratio     sqrt(alpha_b / alpha_a)
+    1  ratio     (sqrt(alpha_b / alpha_a) - .1) / .9, at least 0: ratios below .01 use the
+                 numbers of .01, with M0 and q of their own
     2  view      p / (p + r), p^2 = alpha_e (1 - c), r^2 = c (1 + alpha_e), c = v_z and
                  alpha_e = |(alpha_x v_x, alpha_y v_y)| / |(v_x, v_y)|: the
                  isotropic table's axis for the alpha along the view
@@ -72,6 +73,7 @@ CHANNELS = 7
 AXES = ("azimuth", "ratio", "view", "alpha")
 """Names of the axes, in the order of the arrays."""
 
+_ROOT_MIN = 0.1  # root of the smallest ratio of alphas that nodes tell apart
 _ALPHA_LIMIT = 1e-6  # stands for alpha = 0 at nodes, as in ltc.table
 _ARRAYS = ("residual", "albedo", "fresnel")
 
@@ -114,7 +116,8 @@ def table_coordinates(alpha_x: ArrayLike, alpha_y: ArrayLike, v: ArrayLike) -> F
     s, stretched = np.hypot(va, vb), np.hypot(a * va, b * vb)
     along = np.divide(stretched, s, out=a.copy(), where=s > 0.0)
     p, r = np.sqrt(stretched * s / (1.0 + c)), np.sqrt(c * (1.0 + along))
-    return np.stack([azimuth, np.sqrt(b / a), p / (p + r), np.sqrt(a)], axis=-1)
+    ratio = np.clip((np.sqrt(b / a) - _ROOT_MIN) / (1.0 - _ROOT_MIN), 0.0, 1.0)
+    return np.stack([azimuth, ratio, p / (p + r), np.sqrt(a)], axis=-1)
 
 
 def node_views(shape: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -126,7 +129,7 @@ def node_views(shape: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray
     nodes = [np.linspace(0.0, 1.0, n) for n in shape]
     azimuth, ratio, view, x = np.meshgrid(*nodes, indexing="ij")
     a = np.maximum(x * x, _ALPHA_LIMIT)
-    b = np.maximum(ratio * ratio * a, _ALPHA_LIMIT)
+    b = np.maximum(np.square(_ROOT_MIN + (1.0 - _ROOT_MIN) * ratio) * a, _ALPHA_LIMIT)
     direction = np.stack([1.0 - azimuth, azimuth], axis=-1)
     direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
     along = np.hypot(a * direction[..., 0], b * direction[..., 1])

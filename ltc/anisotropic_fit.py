@@ -52,7 +52,7 @@ FloatArray = NDArray[np.float64]
 
 SHAPE: Shape = (4, 4, 8, 8)
 """Default nodes of the residual along `ltc.anisotropic.AXES`."""
-ALBEDO_SHAPE: Shape = (5, 8, 10, 20)
+ALBEDO_SHAPE: Shape = (4, 7, 12, 24)
 """Default nodes of albedo and Fresnel term."""
 CONFIGURATIONS = 40_000
 """Default number of rectangles fitted to."""
@@ -60,12 +60,14 @@ RATIO_BOUNDS = (0.01, 0.05, 0.1, 0.3, 0.6, 1.0)
 """Bounds of the error figures' ranges of the smaller alpha over the larger."""
 
 _RATIO_MIN = 0.01  # smallest ratio of alphas in the error figures
+_ALBEDO_STEP = 0.2  # of the quadrature; errs less than half floats by far
 _ALBEDO_COSINE = 1e-7  # in units of the smaller alpha; stands for a view in the surface
-_ALBEDO_TIE = 1e-3  # weight of a node's own exact value beside the values read between nodes
+_ALBEDO_TIE = 0.1  # weight of a node's own exact value beside the values read between nodes
 _SMOOTHNESS = 1e-5  # weight of squared second differences of the residual
 _LOBES, _DIRECTIONS = 4000, 64  # views, and directions each, in the total variation
 _FIGURE_LOBES, _FIGURE_DIRECTIONS = 2000, 512  # the same in the figures
 _DETERMINANT_MARGIN = 0.15  # determinants of I + X below this are penalised, by squares
+_DETERMINANT_WEIGHT = 0.02
 _DAMPING_FLOOR = 0.1  # damping of unknowns that little depends on, in mean curvatures
 _STEPS = 30  # at most
 _SOLVER_STEPS, _SOLVER_ACCURACY = 400, 1e-3  # of conjugate gradients
@@ -92,13 +94,14 @@ def random_views(
     The square root of the larger alpha is uniform from sqrt(.001) to 1, the ratio from .01 to
     1, which of them is the larger is a coin's, theta is uniform from 0 to 89.9 degrees and
     the azimuth over the circle. For training the square root of alpha begins at .01; the ratio
-    or, by a coin, its square root is uniform from 0 on; and for a fifth of the views the
+    or, by a coin, its square root is uniform; and for a fifth of the views the
     table's view axis is uniform instead of theta. No alpha is below ALPHA_MIN.
     """
     a = rng.uniform(0.01 if training else np.sqrt(1e-3), 1.0, count) ** 2
     if training:
-        ratio = rng.uniform(0.0, 1.0, count)
-        ratio = np.where(rng.random(count) < 0.5, ratio, ratio * ratio)
+        root = rng.uniform(np.sqrt(_RATIO_MIN), 1.0, count)
+        uniform = rng.uniform(_RATIO_MIN, 1.0, count)
+        ratio = np.where(rng.random(count) < 0.5, uniform, root * root)
     else:
         ratio = rng.uniform(_RATIO_MIN, 1.0, count)
     b = np.maximum(ratio * a, ALPHA_MIN)
@@ -167,7 +170,7 @@ def lobe_variations(
 
 def exact_terms(alpha_x: FloatArray, alpha_y: FloatArray, wo: FloatArray) -> FloatArray:
     """Return exact albedo A and its Fresnel part B, (n, 2) float64."""
-    return np.stack(brdf.directional_albedo(wo, alpha_x, alpha_y), axis=-1)
+    return np.stack(brdf.directional_albedo(wo, alpha_x, alpha_y, _ALBEDO_STEP), axis=-1)
 
 
 def _albedo_nodes(shape: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -258,8 +261,9 @@ class _Determinants:
         short = np.minimum(determinant - _DETERMINANT_MARGIN, 0.0)
         slope = np.einsum("nij,npji->np", np.linalg.inv(matrix), basis)
         slope *= np.where(short < 0.0, determinant, 0.0)[:, None]
-        loss = 0.5 * float(np.sum(short * short))
-        return loss, slope[:, :, None] * slope[:, None, :], short[:, None] * slope
+        loss = 0.5 * _DETERMINANT_WEIGHT * float(np.sum(short * short))
+        weighted = _DETERMINANT_WEIGHT * slope
+        return loss, weighted[:, :, None] * slope[:, None, :], short[:, None] * weighted
 
 
 class _Equations:
