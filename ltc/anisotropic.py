@@ -287,12 +287,13 @@ class AnisotropicTable:
                     f"{name}{list(place)} is {values[place]}, expected the value of the nodes"
                     " that it meets at equal alphas or along the normal"
                 )
-        determinants = halfway_determinants(r)
-        if np.any(determinants <= 0.0):
-            halfway = [float(i) / 2.0 for i in np.argwhere(determinants <= 0.0)[0]]
+        signs = halfway_signs(r)
+        wrong = np.argwhere(np.any(signs <= 0.0, axis=-1))
+        if wrong.size:
+            halfway = [float(i) / 2.0 for i in wrong[0]]
             raise ValueError(
-                f"residual at node {halfway} has the determinant {determinants.min():.4g},"
-                " expected a positive one"
+                "residual at node {} has determinant {:.4g} and trace {:.4g}, expected positive"
+                " numbers".format(halfway, *signs[tuple(wrong[0])])
             )
 
     @property
@@ -346,7 +347,7 @@ class AnisotropicTable:
         view = np.asarray(v, dtype=np.float64)
         pair = np.stack([self.albedo, self.fresnel], axis=-1)
         terms = interpolate(pair, table_coordinates(ax, ay, view))
-        A, q = terms[..., 0], stretched_length(ax, ay, view)
+        A, q = np.minimum(terms[..., 0], 1.0), stretched_length(ax, ay, view)
         return A, A * (1.0 - np.minimum(q * terms[..., 1], 1.0)) ** 5
 
     def textures(self) -> tuple[HalfArray, HalfArray, HalfArray]:
@@ -387,13 +388,22 @@ def halfway_points(shape: Sequence[int]) -> FloatArray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
-def halfway_determinants(residual: NDArray[Any]) -> FloatArray:
-    """Return det(I + X) at all nodes and halfway between, (2 n0 - 1, ...)."""
+def halfway_signs(residual: NDArray[Any]) -> FloatArray:
+    """Return determinant and trace that must be positive, (2 n0 - 1, ..., 2).
+
+    At all nodes and halfway between: of the 2 by 2 matrix that I + X becomes when
+    its last column is eliminated. Its determinant is that of I + X; with a positive
+    trace no two signs have changed at once.
+    """
     fine = [2 * n - 1 for n in residual.shape[:4]]
-    ax, ay, v = node_views(fine)
     entries = interpolate(residual, halfway_points(residual.shape[:4]))
-    X = np.einsum("...p,...pij->...ij", entries, entry_basis(ax, ay, v))
-    return np.asarray(np.linalg.det(np.eye(3) + X))
+    return eliminated(np.einsum("...p,...pij->...ij", entries, entry_basis(*node_views(fine))))
+
+
+def eliminated(X: FloatArray) -> FloatArray:
+    """Return determinant and trace of I + X without its last column and row, (..., 2)."""
+    S = np.eye(2) + X[..., :2, :2] - X[..., :2, 2:] * X[..., 2:, :2]
+    return np.stack([np.linalg.det(S), S[..., 0, 0] + S[..., 1, 1]], axis=-1)
 
 
 def save_anisotropic(table: AnisotropicTable, path: str | Path) -> None:

@@ -18,6 +18,7 @@ from ltc.anisotropic import (
     CHANNELS,
     AnisotropicTable,
     Shape,
+    eliminated,
     entry_basis,
     halfway_points,
     interpolate,
@@ -256,7 +257,7 @@ class _Determinants:
         basis = self.basis[part]
         matrix = np.einsum("np,npij->nij", entries, basis) + np.eye(3)
         determinant = np.linalg.det(matrix)
-        if np.min(determinant) <= 0.0:
+        if np.min(eliminated(matrix - np.eye(3))) <= 0.0:
             return np.inf, np.zeros((*entries.shape, CHANNELS)), np.zeros(entries.shape)
         short = np.minimum(determinant - _DETERMINANT_MARGIN, 0.0)
         slope = np.einsum("nij,npji->np", np.linalg.inv(matrix), basis)
