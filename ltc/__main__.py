@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from ltc import check_command, fit_command
+from ltc import check_command, export, fit_command
 
 
 class _Parser(argparse.ArgumentParser):
@@ -28,6 +28,7 @@ def _parser() -> _Parser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     fit_command.add_parser(commands)
     check_command.add_parser(commands)
+    export.add_parser(commands)
     return parser
 
 
@@ -41,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if parsed.command == "check":
             return check_command.run(parsed)
+        if parsed.command == "export":
+            return export.run(parsed)
         return fit_command.run(parsed)
     except ValueError as error:
         print(f"python -m ltc: {error}", file=sys.stderr)

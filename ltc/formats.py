@@ -41,7 +41,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ltc.anisotropic import AXES, AnisotropicTable, load_anisotropic
+from ltc.anisotropic import AXES, AnisotropicTable, load_anisotropic, node_views
 from ltc.anisotropic import FORMAT as ANISOTROPIC_FORMAT
 from ltc.containers import read_dds
 from ltc.table import (
@@ -426,6 +426,12 @@ class IsotropicGrid:
         return None
 
 
+def smallest_ratio_root() -> float:
+    """Return the root of the smallest ratio of alphas on the anisotropic table's axis."""
+    ax, ay, _ = node_views((2, 2, 2, 2))
+    return float(np.sqrt(ay[0, 0, 0, 1] / ax[0, 0, 0, 1]))
+
+
 @dataclass(frozen=True, eq=False)
 class AnisotropicGrid:
     """This project's anisotropic table; nodes are the residual's."""
@@ -448,8 +454,9 @@ class AnisotropicGrid:
 
     def configuration(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         azimuth, ratio, view, x = np.moveaxis(u, -1, 0)
+        root = smallest_ratio_root()
         ax = np.maximum(x * x, ALPHA_MIN)
-        ay = np.maximum(ratio * ratio * ax, ALPHA_MIN)
+        ay = np.maximum(np.square(root + (1.0 - root) * ratio) * ax, ALPHA_MIN)
         d = np.stack([1.0 - azimuth, azimuth], axis=-1)
         d = d / np.linalg.norm(d, axis=-1, keepdims=True)
         along = np.hypot(ax * d[..., 0], ay * d[..., 1])

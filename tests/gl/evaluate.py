@@ -46,7 +46,8 @@ def evaluate(
     inputs : mapping of str to (n,) or (n, 1..4) array
         Converted to float32.
     tables : mapping of str to (rows, columns, channels) float32
-        Textures that the body may name as samplers.
+        Textures that the body may name as samplers; with a depth before the rows
+        they are volumes.
     prelude : str
         Functions that the library only declares.
 
@@ -60,7 +61,10 @@ def evaluate(
     rows = -(-count // _WIDTH)
     samplers = [*arrays, *(tables or {})]
     lines = [f'#include "{name}"' for name in includes]
-    lines += [f"uniform sampler2D {name}{'_in' if name in arrays else ''};" for name in samplers]
+    for name in samplers:
+        flat = name in arrays or (tables or {})[name].ndim == 3
+        kind = "sampler2D" if flat else "sampler3D"
+        lines.append(f"uniform {kind} {name}{'_in' if name in arrays else ''};")
     lines += ["layout(location = 0) out vec4 result;", prelude, "void main()", "{"]
     lines += ["ivec2 place = ivec2(gl_FragCoord.xy);", "result = vec4(0.0);"]
     for name, value in arrays.items():
@@ -71,7 +75,7 @@ def evaluate(
     (folder / "evaluate.frag").write_text("\n".join(lines), encoding="utf-8")
     source = assemble("evaluate.frag", features or {}, [folder, resource_path("shaders")])
 
-    held: list[moderngl.Texture | moderngl.Framebuffer | moderngl.Program] = []
+    held: list[moderngl.Texture | moderngl.Texture3D | moderngl.Framebuffer | moderngl.Program] = []
     try:
         program = ctx.program(vertex_shader=_VERTEX, fragment_shader=source.text)
         held.append(program)
@@ -83,8 +87,9 @@ def evaluate(
             held.append(texture)
             unit = _bind(program, f"{name}_in", texture, unit)
         for name, table in (tables or {}).items():
-            height, width, channels = table.shape
-            texture = ctx.texture((width, height), channels, table.tobytes(), dtype="f4")
+            *size, channels = table.shape
+            make = ctx.texture if table.ndim == 3 else ctx.texture3d
+            texture = make(tuple(size[::-1]), channels, table.tobytes(), dtype="f4")
             held.append(texture)
             unit = _bind(program, name, texture, unit)
         target = ctx.texture((_WIDTH, rows), 4, dtype="f4")
@@ -103,7 +108,12 @@ def evaluate(
             item.release()
 
 
-def _bind(program: moderngl.Program, name: str, texture: moderngl.Texture, unit: int) -> int:
+def _bind(
+    program: moderngl.Program,
+    name: str,
+    texture: moderngl.Texture | moderngl.Texture3D,
+    unit: int,
+) -> int:
     """Bind to the next unit if the program uses the sampler; return the next free unit."""
     texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
     if name not in program:

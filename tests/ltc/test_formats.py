@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ltc.anisotropic import AnisotropicTable, table_coordinates
 from ltc.formats import (
     POWERS,
+    AnisotropicGrid,
     Grid,
     PublishedGrid,
     closest,
@@ -177,6 +179,21 @@ def test_the_projects_table(rng: np.random.Generator) -> None:
         np.testing.assert_array_equal(a, b)
     u = nodes(found)
     np.testing.assert_allclose(found.at(u).matrix, found.lookup(*found.configuration(u)).matrix)
+
+
+def test_the_projects_anisotropic_table(rng: np.random.Generator) -> None:
+    shape = (3, 4, 5, 4)
+    ones = np.full(shape, 0.5, np.float16)
+    found = AnisotropicGrid(AnisotropicTable(np.zeros((*shape, 7), np.float16), ones, 0.0 * ones))
+    # The axes are the table's own.
+    u = rng.uniform(0.05, 1.0, (400, 4))
+    np.testing.assert_allclose(table_coordinates(*found.configuration(u)), u, atol=1e-9)
+    wo = views(rng, 100)
+    ax, ay = 10.0 ** rng.uniform(-3.0, 0.0, (2, 100))
+    got = found.lookup(ax, ay, wo)
+    np.testing.assert_allclose(got.matrix, closed_form_guess(ax, ay, wo), atol=1e-12)
+    np.testing.assert_allclose(got.albedo, 0.5, rtol=1e-12)
+    assert np.all(np.isfinite(found.at(nodes(found)).matrix))
 
 
 def test_half_floats_round_what_is_stored(tmp_path: Path) -> None:
