@@ -37,7 +37,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ltc import polygon, transform
-from ltc.bezier import evaluate, from_line, part, sign_changes
+from ltc.bezier import broadcast_contours, evaluate, from_line, parts_above
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.intp]
@@ -249,17 +249,13 @@ def _broadcast(
     matrix = np.asarray(cosine_from_shading, dtype=np.float64)
     if matrix.shape[-2:] != (3, 3):
         raise ValueError(f"cosine_from_shading has shape {matrix.shape}, expected (..., 3, 3)")
-    arrays = [np.asarray(contour, dtype=np.float64) for contour in contours]
-    for i, array in enumerate(arrays):
-        if array.ndim < 3 or array.shape[-2:] != (4, 3) or not array.shape[-3]:
-            raise ValueError(f"contour {i} has shape {array.shape}, expected (..., k >= 1, 4, 3)")
-    shape = np.broadcast_shapes(shape, matrix.shape[:-2], *(array.shape[:-3] for array in arrays))
+    shape = np.broadcast_shapes(shape, matrix.shape[:-2])
+    chains, shape = broadcast_contours(contours, shape)
+    for i, chain in enumerate(chains):
+        if not chain.shape[1]:
+            raise ValueError(f"contour {i} has shape {chain.shape}, expected (..., k >= 1, 4, 3)")
     matrix = np.broadcast_to(matrix, (*shape, 3, 3)).reshape(-1, 3, 3)
-    flat = [
-        np.broadcast_to(array, (*shape, *array.shape[-3:])).reshape(-1, *array.shape[-3:])
-        for array in arrays
-    ]
-    return matrix, flat, shape
+    return matrix, chains, shape
 
 
 def _join(chains: list[FloatArray]) -> _Curves:
@@ -277,24 +273,10 @@ def _join(chains: list[FloatArray]) -> _Curves:
 
 def _clip(curves: _Curves) -> _Curves:
     """Return the parts above z = 0, each loop closed by straight curves along the horizon."""
-    below = np.all(curves.points[..., 2] <= 0.0, axis=1)
     if not np.any(curves.points[..., 2] <= 0.0):
         return curves
-    roots, count = sign_changes(curves.points[..., 2])
-    m = len(count)
-    bounds = np.concatenate([np.zeros((m, 1)), roots, np.ones((m, 1))], axis=1)
-    starts_above = curves.points[:, 0, 2] > 0.0
-    j = np.arange(4)
-    keep = (starts_above[:, None] ^ (j % 2 == 1)) & (j <= count[:, None]) & ~below[:, None]
-    row, column = np.nonzero(keep)
-    pieces = curves.pick(row)
-    cut = count[row] > 0
-    points = pieces.points.copy()
-    points[cut] = part(points[cut], bounds[row, column][cut], bounds[row, column + 1][cut])
-    enters, leaves = column > 0, column < count[row]
-    points[enters, 0, 2] = 0.0
-    points[leaves, 3, 2] = 0.0
-    pieces = pieces._replace(points=points)
+    points, curve, enters, leaves = parts_above(curves.points)
+    pieces = curves.pick(curve)._replace(points=points)
 
     # Along a loop the pieces that leave and those that enter take turns.
     loop = pieces.loop

@@ -1,9 +1,9 @@
 """What the techniques converge to, in float64: the measure of all that approximate it.
 
 For ``ltc`` and its kin it is the same table, looked up as the shaders do, and the same lights,
-but their curves integrated to rounding (`ltc.bezier`). The difference to a picture is then what
-a way of integrating costs, and nothing else: not what the fitted lobe itself errs. For
-``ggx`` it is GGX itself (`ltc.reference`).
+but their curves integrated to rounding (`ltc.curved_outline`). The difference to a picture is
+then what a way of integrating costs, and nothing else: not what the fitted lobe itself errs.
+For ``ggx`` it is GGX itself (`ltc.curved_reference`).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from app.outline import boundary
 from app.render.tables import isotropic_textures
 from app.scene import AreaLight
-from ltc import bezier, transform
-from ltc.reference import curve_specular_integral_batch
+from ltc import curved_outline, transform
+from ltc.curved_reference import curve_specular_integral_batch
 from ltc.table import sample_textures
 
 FloatArray = NDArray[np.float64]
@@ -49,7 +49,7 @@ def shading_contours(
     origin, u, v = (np.array(a) for a in (light.plane.origin, light.plane.u, light.plane.v))
     contours = []
     for loop in boundary(light.outline):
-        world = bezier.positive_winding(origin + loop[..., :1] * u + loop[..., 1:] * v)
+        world = curved_outline.positive_winding(origin + loop[..., :1] * u + loop[..., 1:] * v)
         local = np.einsum("nij,nkcj->nkci", frames, world - position[:, None, None])
         contours.append(local)
     return contours
@@ -98,10 +98,10 @@ def exact_radiance(
             front = (p[part] - np.array(light.plane.origin)) @ away > 0.0
             sign = np.where(front, 1.0, -1.0) * (front | light.two_sided)
             if lobe == "ltc":
-                share = gain * bezier.ltc_form_factor(inverse, contours).value
+                share = gain * curved_outline.ltc_form_factor(inverse, contours).value
             else:
                 share, _ = curve_specular_integral_batch(contours, local, a[part], a[part])
-            lambert = bezier.form_factor(contours).value
+            lambert = curved_outline.form_factor(contours).value
             specular[part] += np.maximum(sign * share, 0.0)[:, None] * light.radiance
             diffuse[part] += np.maximum(sign * lambert, 0.0)[:, None] * light.radiance
     return specular, diffuse

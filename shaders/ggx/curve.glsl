@@ -1,5 +1,5 @@
 // GGX along the curves of a light: which chords of its outline's tree will do, and half vectors
-// along the others. Truth: ltc.reference.curve_specular_integral.
+// along the others. Truth: ltc.curved_reference.curve_specular_integral.
 //
 // Along a curve (h' x dh')/|h'|^2 has poles where the curve, drawn on, meets the mirror
 // direction or comes back to the viewer's (|h'|^2 = 0), and where it meets the point itself

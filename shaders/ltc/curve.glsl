@@ -1,4 +1,4 @@
-// Contour integral of the form factor along cubic Bézier curves. Truth: ltc.bezier.
+// Contour integral of the form factor along cubic Bézier curves. Truth: ltc.curved_outline.
 //
 // In the cosine's frame the integrand (x y' - y x') / |r|^2 is rational in the curve's
 // parameter; how fast Gauss-Legendre converges is decided by the nearest complex root of

@@ -1,4 +1,4 @@
-"""Curved lights: the GPU's float32 against float64 along the very curves (ltc.bezier)."""
+"""Curved lights: the GPU's float32 against float64 along the very curves (ltc.curved_outline)."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from app.scene import (
 )
 from app.scene_io import load_scene
 from app.text import text_outline
-from ltc.bezier import form_factor, ltc_specular, positive_winding
-from ltc.reference import curve_specular_integral_batch
+from ltc.curved_outline import form_factor, ltc_specular, positive_winding
+from ltc.curved_reference import curve_specular_integral_batch
 from ltc.resources import resource_path
 from ltc.table import sample_textures
 from tests.gl.test_probe import FloatArray, Points, lamp_points, random_points, unit

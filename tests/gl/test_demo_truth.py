@@ -16,9 +16,10 @@ from app.render.camera import CameraFrame
 from app.render.renderer import Renderer
 from app.scene import AreaLight, BezierContour, RenderSettings, Shot
 from app.scene_io import demo_scenes, load_scene
-from ltc.bezier import form_factor
+from ltc.curved_outline import form_factor
+from ltc.curved_reference import curve_specular_integral_batch
 from ltc.polygon import clipped_form_factor
-from ltc.reference import curve_specular_integral_batch, specular_integral_batch
+from ltc.reference import specular_integral_batch
 
 WIDTH, HEIGHT = 64, 36
 

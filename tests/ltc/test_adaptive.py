@@ -1,6 +1,6 @@
 """The published methods for curved lights, against the curves' own integral.
 
-That is quadrature of the one-form (`ltc.bezier`), which has neither edges nor triangles.
+That is quadrature of the one-form (`ltc.curved_outline`), which has neither edges nor triangles.
 """
 
 import numpy as np
@@ -8,7 +8,7 @@ import pytest
 
 from ltc import adaptive, transform
 from ltc.adaptive import is_straight, specular_epsilon, uniform
-from ltc.bezier import ltc_form_factor
+from ltc.curved_outline import ltc_form_factor
 from ltc.table import load_isotropic
 from tests.ltc.test_polygon import place, random_planes
 
