@@ -64,6 +64,7 @@ _RATIO_MIN = 0.01  # smallest ratio of alphas in the error figures
 _ALBEDO_STEP = 0.2  # of the quadrature; errs less than half floats by far
 _ALBEDO_COSINE = 1e-7  # in units of the smaller alpha; stands for a view in the surface
 _ALBEDO_TIE = 0.1  # weight of a node's own exact value beside the values read between nodes
+_VARIATION = 0.12  # weight of the total variation
 _SMOOTHNESS = 1e-5  # weight of squared second differences of the residual
 _LOBES, _DIRECTIONS = 4000, 64  # views, and directions each, in the total variation
 _FIGURE_LOBES, _FIGURE_DIRECTIONS = 2000, 512  # the same in the figures
@@ -228,7 +229,13 @@ def albedo_tables(
             equations.tocsr(), W.T @ (there**2 * seen) + here**2 * own, x0=own, rtol=1e-8
         )
         result.append(np.maximum(spread @ solution, 0.0).reshape(shape))
-    return np.minimum(result[0], 1.0).astype(np.float16), result[1].astype(np.float16)
+    return _halves(np.minimum(result[0], 1.0)), _halves(result[1])
+
+
+def _halves(values: FloatArray) -> NDArray[np.float16]:
+    """Return half floats; numbers too small for them are as good as zero."""
+    with np.errstate(under="ignore"):
+        return values.astype(np.float16)
 
 
 class _Cases:
@@ -480,14 +487,14 @@ def fit_anisotropic(
     shading = ShadingError(cases, exact, A, entry_basis(*views))
     rng = np.random.default_rng([seed, _VARIATION_STREAM])
     lobe_views = random_views(rng, min(_LOBES, configurations), training=True)
-    lobes = LobeVariation(rng, *lobe_views, _DIRECTIONS, entry_basis(*lobe_views))
+    lobes = LobeVariation(rng, *lobe_views, _DIRECTIONS, entry_basis(*lobe_views), _VARIATION)
     grid = GridFit(
         shape,
         [(shading, table_coordinates(*views)), (lobes, table_coordinates(*lobe_views))],
     )
     start = work.state or FitState(np.zeros(grid.shape))
     state = fitting.follow(work, grid.steps(start), _STEPS, report)
-    table = AnisotropicTable(state.residual.astype(np.float16), albedo, fresnel)
+    table = AnisotropicTable(_halves(state.residual), albedo, fresnel)
     report("error: lights and views that were not fitted to")
     figures = measure(table, seed)
     provenance = {

@@ -103,6 +103,7 @@ ALBEDO_NODES = 32
 
 _ENTRIES = ((0, 0), (0, 2), (1, 1), (2, 0))  # of X, in the order of the table's channels
 _ALBEDO_COSINE = 1e-7  # in units of alpha; stands for a view exactly in the surface
+_VARIATION = 0.03  # weight of the total variation
 _SMOOTHNESS = 1e-5  # weight of squared second differences of the residual
 _LOBES, _DIRECTIONS = 2000, 64  # views, and directions each, in the total variation
 _FACTOR_MARGIN = 0.15  # factors of det(I + X) smaller than this are penalised, by squares
@@ -210,7 +211,7 @@ def random_variation(rng: np.random.Generator, views: int) -> tuple[LobeVariatio
     )
     alpha = x * x
     basis = entry_basis(np.sqrt(1.0 - c * c))
-    lobes = LobeVariation(rng, alpha, alpha, _views(c), _DIRECTIONS, basis)
+    lobes = LobeVariation(rng, alpha, alpha, _views(c), _DIRECTIONS, basis, _VARIATION)
     return lobes, np.stack(table_coordinates(alpha, c))
 
 

@@ -30,9 +30,6 @@ THETA_MAX = np.radians(89.9)
 CHUNK = 2048
 """Configurations per piece of work."""
 
-VARIATION_WEIGHT = 0.03
-"""Weight of the total variation beside the shading error."""
-
 _EPSILON = 1e-3  # below this error the loss is quadratic, above it absolute
 _TAIL = 50.0  # weight of the squared error beside the absolute one
 _RELATIVE_FLOOR = 0.05  # relative errors of the density below this count as squares
@@ -345,6 +342,8 @@ class LobeVariation:
         For each view.
     basis : (n, p, 3, 3) float64
         The entries' basis matrices, see `Lobe`.
+    importance : float
+        Of the mean total variation beside the other terms of the loss.
     """
 
     def __init__(
@@ -355,8 +354,9 @@ class LobeVariation:
         wo: FloatArray,
         directions: int,
         basis: FloatArray,
+        importance: float = 1.0,
     ) -> None:
-        self.basis = basis
+        self.basis, self.importance = basis, importance
         self.count = alpha_x.size
         self.guess = closed_form_guess(alpha_x, alpha_y, wo)
         inverse = transform.invert(self.guess)
@@ -408,8 +408,8 @@ class LobeVariation:
         error, slope = self.differences(entries, part)
         floor = _RELATIVE_FLOOR * 0.5 / error.shape[1]
         softened = np.sqrt(error * error + floor * floor)
-        loss = VARIATION_WEIGHT * float(np.sum(softened - floor)) / self.count
-        w = VARIATION_WEIGHT / self.count / softened
+        loss = self.importance * float(np.sum(softened - floor)) / self.count
+        w = self.importance / self.count / softened
         weighted = np.swapaxes(slope, 1, 2) * w[:, None, :]
         return loss, weighted @ slope, np.einsum("nk,nki->ni", w * error, slope)
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ltc import __main__ as command_line
-from ltc import fit, fit_command, fitting, objective, transform
+from ltc import fit, fit_command, fitting, transform
 from ltc.fit import fit_isotropic
 from ltc.fitting import CheckpointError
 from ltc.objective import Configurations, Lobe, ShadingError
@@ -125,7 +125,7 @@ class TestDerivatives:
         np.testing.assert_allclose(np.sum(2.0 * lobes.ggx * lobes.weight, axis=1), 1.0)
         X = np.zeros((20, 4))
         loss, _, slope = lobes.normal_equations(X, slice(None))
-        assert 0.01 < loss / objective.VARIATION_WEIGHT < 0.3
+        assert 0.01 < loss / fit._VARIATION < 0.3
         for i in range(4):
             step = np.zeros(4)
             step[i] = 1e-4
