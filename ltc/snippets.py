@@ -6,15 +6,22 @@ the three has not (no matrices, no ternaries, no vectors from one scalar). What
 comes out is plain code without uniforms, entry points or preprocessor.
 
 The mathematics is that of ``shaders/ltc/table.glsl`` and ``shaders/ltc/lobe.glsl`` for the
-isotropic table. The anisotropic one needs M0^-1 in full. With T, W, D, R of
-`ltc.table.closed_form_guess`, W = D R N, N = I - v'_xy v'_xy^T / (2 (1 + v'_z)):
+isotropic table. The anisotropic one needs M0^-1 in full. With T, D, R, N of
+`ltc.table.closed_form_guess`, M0 = T D R N diag(2, 2, 1), e_1 along v'_xy, e_2 across:
 
-    T = c I + [k]x with k = v x h, so T^-1 = (c^2 I + k k^T - c [k]x) / (c |h|^2),
-    N^-1 = I + v'_xy v'_xy^T / (2 (1 + v'_z) - |v'_xy|^2) = I + v'_xy v'_xy^T / (1 + v'_z)^2,
-    M^-1 = (I + X)^-1 diag(1/2, 1/2, 1) N^-1 R^T D^-1 T^-1 |third column|,
+    N^-1 = diag(2 / (1 + v'_z), 1, 1) in the basis e_1, e_2, z,
+    T = c I + [k]x with k = v x h, so p T^-1 = (c^2 p + (p.k) k - c p x k) / (c |h|^2).
 
-R^T is R with the signs of its mixed entries changed, and (I + X)^-1 is its adjugate over
-a determinant of .3 or more: nothing is inverted numerically that could cancel.
+The rows p_i of R^T D^-1 are D^-1 R e_i with h = D m, so p_1.h = p_2.h = 0, p_3.h = 1 and
+p x k = (p.h) v - (p.v) h. What cancels at grazing views is written out, by
+det(D) D^-1 (a x b) = D a x D b (w = ax ay / |D v|, m_s and v'_s the parts along e_1):
+
+    w p_1.k = (m.v') m_s e_1x e_1y (ax^2 - ay^2),
+    w p_2.k = v'_z m_s |D e_1|^2 - v'_s m_z,
+    w p_3.k = -(m x v').e_2 m_s e_1x e_1y (ax^2 - ay^2),
+    p_2.v = v_x v_y (ax^2 - ay^2) / (ax ay |D v_xy|), k_z = -m_s v_x v_y (ax^2 - ay^2) / |D v_xy|.
+
+(I + X)^-1 is the adjugate over a determinant of .3 or more.
 """
 
 from __future__ import annotations
@@ -214,53 +221,64 @@ LtcLobe ltc_lobe(
     vec3 i1 = vec3(x.z * v.x * v.y, 1.0 + x.x - d + x.z * v.y * v.y, ey);
     vec3 i2 = vec3(gx, gy, 1.0);
 
-    // v': the view stretched; m: between v' and the normal; h: the lobe's centre.
-    vec3 sv = vec3(ax * v.x, ay * v.y, v.z);
-    float stretched = length(sv);
-    sv = sv / stretched;
-    float flat2 = sv.x * sv.x + sv.y * sv.y;
-    vec3 m = vec3(sv.x, sv.y, sv.z + 0.7 * flat2 / (1.0 + sv.z));
-    m = m / length(m);
-    vec3 h = vec3(ax * m.x, ay * m.y, m.z);
+    // v' = (vs, vz) and m = (ms, mz) in the plane of e1 and the normal; h: the lobe's centre.
+    float n = length(vec2(ax * v.x, ay * v.y));
+    float stretched = length(vec2(n, v.z));
+    float vs = n / stretched;
+    float vz = v.z / stretched;
+    vec2 e1 = vec2(1.0, 0.0);
+    float mixed = 0.0;
+    float skew = (ax - ay) * (ax + ay);
+    if (n > 0.0) {
+        e1 = vec2(ax * v.x / n, ay * v.y / n);
+        mixed = v.x * v.y * skew / n;
+    }
+    vec2 e2 = vec2(-e1.y, e1.x);
+    float tilt = 0.7 * vs * vs / (1.0 + vz);
+    float inv = inversesqrt(vs * vs + (vz + tilt) * (vz + tilt));
+    float ms = vs * inv;
+    float mz = (vz + tilt) * inv;
+    vec3 h = vec3(ax * ms * e1.x, ay * ms * e1.y, mz);
     float c = dot(v, h);
-    vec3 k = cross(v, h);
+    vec3 k = vec3(v.y * h.z - v.z * h.y, v.z * h.x - v.x * h.z, -ms * mixed);
 
-    // Rows of T^-1, up to 1 / (c |h|^2), then of R^T D^-1 T^-1 times alpha_x.
-    vec3 t0 = k.x * k + c * vec3(c, k.z, -k.y);
-    vec3 t1 = (k.y * k + c * vec3(-k.z, c, k.x)) * (ax / ay);
-    vec3 t2 = (k.z * k + c * vec3(k.y, -k.x, c)) * ax;
-    float g = 1.0 / (1.0 + m.z);
-    vec3 w0 = (1.0 - m.x * m.x * g) * t0 - m.x * m.y * g * t1 - m.x * t2;
-    vec3 w1 = (1.0 - m.y * m.y * g) * t1 - m.x * m.y * g * t0 - m.y * t2;
-    vec3 w2 = m.x * t0 + m.y * t1 + m.z * t2;
+    // alpha_x times rows of R^T D^-1, their products with v and k, and themselves times T^-1.
+    float q = ax / ay;
+    vec3 p1 = vec3(mz * e1.x, mz * e1.y * q, -ms * ax);
+    vec3 p2 = vec3(e2.x, e2.y * q, 0.0);
+    vec3 p3 = vec3(ms * e1.x, ms * e1.y * q, mz * ax);
+    float turn = skew * e1.x * e1.y * ms * stretched / ay;
+    float across1 = (ms * vs + mz * vz) * turn;
+    float across2 = stretched / ay * (vz * dot(h.xy, vec2(ax * e1.x, ay * e1.y)) - vs * mz);
+    float across3 = -tilt * inv * vs * turn;
+    vec3 a1 = c * (c * p1 + dot(p1, v) * h) + across1 * k;
+    vec3 a2 = c * (c * p2 + mixed / ay * h) + across2 * k;
+    vec3 a3 = c * (c * p3 + dot(p3, v) * h - ax * v) + across3 * k;
     // N^-1 and the diagonal.
-    float n = 1.0 / ((1.0 + sv.z) * (1.0 + sv.z));
-    vec3 along_view = (sv.x * w0 + sv.y * w1) * n;
-    vec3 z0 = 0.5 * (w0 + sv.x * along_view);
-    vec3 z1 = 0.5 * (w1 + sv.y * along_view);
+    float narrow = 0.5 * (1.0 + vz);
+    a1 = a1 * (0.5 / narrow);
+    a2 = 0.5 * a2;
+    vec3 z0 = e1.x * a1 + e2.x * a2;
+    vec3 z1 = e1.y * a1 + e2.y * a2;
     // Columns of the adjugate of I + X are cross products of its rows.
     vec3 c0 = cross(i1, i2);
     vec3 c1 = cross(i2, i0);
     vec3 c2 = cross(i0, i1);
 
     // The z row of M0, then of M.
-    vec3 tz = vec3(h.z * v.x - v.z * h.x, h.z * v.y - v.z * h.y, c);
-    tz = vec3(ax * tz.x, ay * tz.y, tz.z);
-    float q = 0.5 / (1.0 + sv.z);
-    vec2 rz = vec2(
-        (1.0 - m.x * m.x * g) * tz.x - m.x * m.y * g * tz.y - m.x * tz.z,
-        (1.0 - m.y * m.y * g) * tz.y - m.x * m.y * g * tz.x - m.y * tz.z);
-    float narrow = q * (sv.x * rz.x + sv.y * rz.y);
-    vec3 z_row = vec3(2.0 * (rz.x - narrow * sv.x), 2.0 * (rz.y - narrow * sv.y), dot(m, tz));
+    vec2 tz = vec2(ax * (h.z * v.x - v.z * h.x), ay * (h.z * v.y - v.z * h.y));
+    float r1 = 2.0 * narrow * (mz * dot(e1, tz) - ms * c);
+    float r2 = 2.0 * dot(e2, tz);
+    vec3 z_row = vec3(e1.x * r1 + e2.x * r2, e1.y * r1 + e2.y * r2, ms * dot(e1, tz) + mz * c);
     vec3 m_row = z_row.x * i0 + z_row.y * i1 + z_row.z * i2;
 
     float u = 1.0 - min(stretched * stored.y, 1.0);
     float u2 = u * u;
 
     LtcLobe lobe;
-    lobe.row0 = c0.x * z0 + c1.x * z1 + c2.x * w2;
-    lobe.row1 = c0.y * z0 + c1.y * z1 + c2.y * w2;
-    lobe.row2 = c0.z * z0 + c1.z * z1 + c2.z * w2;
+    lobe.row0 = c0.x * z0 + c1.x * z1 + c2.x * a3;
+    lobe.row1 = c0.y * z0 + c1.y * z1 + c2.y * a3;
+    lobe.row2 = c0.z * z0 + c1.z * z1 + c2.z * a3;
     lobe.above = 0.5 + 0.5 * m_row.z / length(m_row);
     lobe.albedo = stored.x;
     lobe.fresnel = stored.x * u2 * u2 * u;

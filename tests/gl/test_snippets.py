@@ -96,7 +96,7 @@ def compare(kind: str, inputs: dict[str, np.ndarray], rows: np.ndarray, rest: np
     away = np.max(np.abs(unit / scale[:, None, None] - np.eye(3)), axis=(1, 2))
     sharp = np.minimum(inputs["alpha"], inputs.get("ratio", inputs["alpha"]))
     assert np.median(away * sharp) < 1e-7
-    # Anisotropic within a degree of grazing, T^-1 cancels where c is small.
+    # At grazing views lobes are as thin as alpha v_z across, and rounding the view shows.
     grazing = inputs["v"][:, 2] < 0.03 if "v" in inputs else np.zeros(COUNT, dtype=bool)
     assert np.max(away[~grazing] * sharp[~grazing]) < 2e-6
     assert np.max(away * sharp) < 1e-4
@@ -105,7 +105,7 @@ def compare(kind: str, inputs: dict[str, np.ndarray], rows: np.ndarray, rest: np
     axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
     turn = np.linalg.norm(np.cross(axis, want.matrix[:, :, 2]), axis=-1)
     assert np.percentile(turn[~grazing], 99) < 2e-6
-    assert np.max(turn[~grazing]) < 1e-5
+    assert np.max(turn[~grazing]) < 3e-5
     assert np.max(turn) < 2e-4
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import sys
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from ltc.__main__ import main
 from ltc.resources import resource_path
 from tests.ltc.published import sound, write_dds, write_npy
 
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "tables.md"
 FEW = ["--rectangles", "50"]
 SHIPPED = str(resource_path("luts", "ltc_isotropic.npz"))
 
@@ -79,6 +82,19 @@ def test_plots(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in written:
         assert (tmp_path / "new" / "plots" / name).read_bytes().startswith(b"\x89PNG")
         assert name in told
+
+
+@pytest.mark.skipif(not PAGE.is_file(), reason="needs the source tree")
+def test_commands_that_the_page_shows_exist(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = re.findall(r"^python -m ltc (.*)$", PAGE.read_text("utf-8"), re.MULTILINE)
+    assert {line.split()[0] for line in lines} == {"check", "export"}
+    for line in lines:
+        words_ = shlex.split(line)
+        with pytest.raises(SystemExit) as stop:
+            main([words_[0], "--help"])
+        assert stop.value.code == 0
+        told = capsys.readouterr().out
+        assert all(word in told for word in words_ if word.startswith("-"))
 
 
 def test_plots_without_matplotlib(
