@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     for file in arguments.files:
         if not file.is_file():
             raise ValueError(f"{file}: no such file, expected a table")
-    report = check(formats.read(arguments.files), arguments.seed, arguments.rectangles)
+    report = check(formats.read(arguments.files, True), arguments.seed, arguments.rectangles)
     show(report, str(arguments.files[0]))
     if plots is not None:
         for path in check_plots.write_plots(report, plots):

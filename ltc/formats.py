@@ -36,12 +36,12 @@ import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ltc.anisotropic import AXES, AnisotropicTable, load_anisotropic, node_views
+from ltc.anisotropic import AXES, CHANNELS, AnisotropicTable, load_anisotropic, node_views
 from ltc.anisotropic import FORMAT as ANISOTROPIC_FORMAT
 from ltc.containers import read_dds
 from ltc.table import (
@@ -51,11 +51,13 @@ from ltc.table import (
     Textures,
     alpha_and_cosine,
     closed_form_guess,
+    load_arrays,
     load_isotropic,
     sample_textures,
 )
 
 FloatArray = NDArray[np.float64]
+Table = TypeVar("Table", IsotropicTable, AnisotropicTable)
 
 POWERS = (1.0, 2.0, 0.5)
 """What alpha may have been raised to by mistake: nothing, squared, its root taken."""
@@ -516,7 +518,7 @@ def closest(layouts: Sequence[Layout], matrix: FloatArray) -> Layout:
     return layouts[best] if scores[best] < 0.7 * scores[0] - 0.05 else layouts[0]
 
 
-def read(paths: Sequence[str | Path]) -> Grid:
+def read(paths: Sequence[str | Path], anyway: bool = False) -> Grid:
     """Return the table in one file, or in several that belong together.
 
     Parameters
@@ -525,6 +527,9 @@ def read(paths: Sequence[str | Path]) -> Grid:
         One ``.npz`` of this project; ``ltc_1.dds`` and, where there is one,
         ``ltc_2.dds``; one ``.js``; one ``.inc`` or ``.h``; or ``.npy`` files:
         matrices, then amplitude, then Fresnel part.
+    anyway : bool
+        Return a broken table of this project too, for examination; published ones
+        are not judged here.
 
     Raises
     ------
@@ -553,10 +558,12 @@ def read(paths: Sequence[str | Path]) -> Grid:
     most, reader = readers[suffix]
     if len(files) > most:
         raise ValueError(f"{files[most]}: one file too many, a table has at most {most} {suffix}")
+    if suffix == ".npz":
+        return _read_npz(files[0], anyway)
     return reader(*files)
 
 
-def _read_npz(file: Path) -> Grid:
+def _read_npz(file: Path, anyway: bool = False) -> Grid:
     data = file.read_bytes()
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
@@ -565,10 +572,56 @@ def _read_npz(file: Path) -> Grid:
     except (ValueError, KeyError, OSError, EOFError, AttributeError, zipfile.BadZipFile):
         kind = FORMAT  # the loader below says what is wrong
     if kind == FORMAT:
-        return IsotropicGrid.of(load_isotropic(file))
+        try:
+            return IsotropicGrid.of(load_isotropic(file))
+        except ValueError as refused:
+            if not anyway:
+                raise
+            return IsotropicGrid.of(_anyway(file, "<f4", FORMAT, _UncheckedIsotropic, refused))
     if kind == ANISOTROPIC_FORMAT:
-        return AnisotropicGrid(load_anisotropic(file))
+        try:
+            return AnisotropicGrid(load_anisotropic(file))
+        except ValueError as refused:
+            if not anyway:
+                raise
+            return AnisotropicGrid(
+                _anyway(file, "<f2", ANISOTROPIC_FORMAT, _UncheckedAnisotropic, refused)
+            )
     raise ValueError(f"{file}: format is {kind!r}, expected {FORMAT!r} or {ANISOTROPIC_FORMAT!r}")
+
+
+class _UncheckedIsotropic(IsotropicTable):
+    def __post_init__(self) -> None: ...
+
+
+class _UncheckedAnisotropic(AnisotropicTable):
+    def __post_init__(self) -> None: ...
+
+
+def _anyway(
+    file: Path,
+    dtype: str,
+    file_format: str,
+    make: Callable[..., Table],
+    refused: ValueError,
+) -> Table:
+    """Return a table of this project that its own loader refused, for the doctor to name why.
+
+    Shapes must be right and numbers finite: without these nothing can be looked up.
+    """
+    names = ("residual", "albedo", "fresnel")
+    arrays, provenance = load_arrays(file, names, np.dtype(dtype), file_format, "a table")
+    residual, albedo, fresnel = (arrays[name] for name in names)
+    flat = file_format == FORMAT
+    dimensions, channels, least = (2, 4, 4) if flat else (4, CHANNELS, 2)
+    right = residual.ndim == dimensions + 1 and residual.shape[-1] == channels
+    right &= albedo.ndim == dimensions and albedo.shape == fresnel.shape
+    right = right and min(*residual.shape[:-1], *albedo.shape) >= least
+    if flat and right:
+        right = residual.shape[0] == residual.shape[1] and albedo.shape[0] == albedo.shape[1]
+    if not right or not all(np.all(np.isfinite(array)) for array in arrays.values()):
+        raise refused
+    return make(residual, albedo, fresnel, provenance)
 
 
 def _heitz_inverse(texels: NDArray[Any]) -> FloatArray:

@@ -12,7 +12,7 @@ from ltc import brdf
 from ltc.check import Fault, Report, check, fixed_decimals, variation, variation_from_ggx
 from ltc.formats import heitz_layout, kt_layout, read
 from ltc.resources import resource_path
-from ltc.table import closed_form_guess, load_isotropic
+from ltc.table import closed_form_guess, load_isotropic, npz_bytes
 from tests.ltc.published import (
     Table,
     grid,
@@ -40,6 +40,13 @@ def test_the_shipped_table_is_sound() -> None:
     assert errors == sorted(errors, reverse=True)
     assert errors[0] == pytest.approx(report.figures["max"], rel=1e-3)
     assert not any(finding.warning for finding in report.findings)
+
+
+def test_the_shipped_anisotropic_table_is_sound() -> None:
+    report = check(read([resource_path("luts", "ltc_anisotropic.npz")]), rectangles=600)
+    assert report.faults == ()
+    assert report.figures["mean"] < 0.0045
+    assert any(finding.what == "seam alpha_x = alpha_y" for finding in report.findings)
 
 
 @pytest.mark.parametrize(
@@ -219,6 +226,29 @@ def test_isotropy(tmp_path: Path) -> None:
     table.matrix[:, -1] = lobes(kt_layout(), KT, 2.5)[:, -1]
     report = doctor(write_npy(tmp_path, table))
     assert report.faults == (Fault.ISOTROPY,)
+
+
+@pytest.mark.parametrize("name", ["isotropic", "anisotropic"])
+def test_tables_that_their_loader_refuses_are_examined(name: str, tmp_path: Path) -> None:
+    source = resource_path("luts", f"ltc_{name}.npz")
+    with np.load(source) as file:
+        arrays = {key: file[key] for key in file.files}
+    residual = arrays["residual"]
+    place = (slice(2, 4), slice(2, 4)) if name == "isotropic" else (1, 2, 2, 2)
+    if name == "isotropic":
+        residual[(*place, 2)] = -1.6  # 1 + X11 below zero
+    else:
+        residual[(*place, 0)] = residual[(*place, 2)] = 0.0
+        residual[(*place, 1)] = 2.0  # (1 + d) (1 - d) below zero
+    file_ = tmp_path / "broken.npz"
+    file_.write_bytes(npz_bytes(arrays))
+    assert check(read([file_], True), 1, 100, 50).faults[0] is Fault.NEGATIVE
+    with pytest.raises(ValueError, match="determinant"):
+        read([file_])
+    arrays["residual"] = residual[..., 0]
+    file_.write_bytes(npz_bytes(arrays))
+    with pytest.raises(ValueError, match="residual has shape"):
+        read([file_], True)
 
 
 def test_half_floats_are_a_warning(tmp_path: Path) -> None:
