@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import curves as cubic
-from app.curves import is_straight, line_as_cubic
+from app.curves import is_straight, length, line_as_cubic, unit
 from app.scene import (
     AnchorKind,
     BezierContour,
@@ -59,7 +59,7 @@ BENT = 0.25
 """Where on its chord a bent line gets its handles: off the thirds, so that it counts as a curve."""
 
 MOST_PIECES = 1024
-"""Into how many pieces `flatten` cuts a curve at most."""
+"""Into how many pieces the outlines that one sees and edits cut a curve at most."""
 
 
 # Reading
@@ -170,37 +170,11 @@ def flatten(contour: Contour, tolerance: float, metric: FloatArray = UNIT) -> Fl
     ----------
     tolerance : float
         The largest distance, measured by ``metric``, down to `MOST_PIECES` pieces a curve.
-
-    Notes
-    -----
-    Wang's bound: k equal pieces of a cubic miss it by at most
-    (6 / 8) m / k^2, m the larger second difference of its control points.
     """
     if isinstance(contour, PolygonContour):
         return np.array(contour.points, dtype=np.float64)
     curves = curves_of(contour)
-    return subdivide(curves, pieces(curves @ metric.T, tolerance))
-
-
-def pieces(curves: FloatArray, tolerance: FloatArray | float) -> NDArray[np.int64]:
-    """Return into how many pieces to cut each curve (n, 4, 2), (n,) int from 1 on.
-
-    ``tolerance`` is the distance allowed, in the curves' unit, of shape () or (n,).
-    """
-    second = np.diff(curves, n=2, axis=1)
-    largest = np.sqrt((second**2).sum(-1)).max(-1)
-    wanted = np.ceil(np.sqrt(0.75 * largest / tolerance))
-    wanted[is_straight(curves)] = 1.0
-    counts: NDArray[np.int64] = np.clip(wanted, 1.0, MOST_PIECES).astype(np.int64)
-    return counts
-
-
-def subdivide(curves: FloatArray, counts: NDArray[np.int64]) -> FloatArray:
-    """Return the points where curves (n, 4, 2) begin and are cut, (sum of counts, 2)."""
-    which = np.repeat(np.arange(len(curves)), counts)
-    first = np.cumsum(counts) - counts
-    along = (np.arange(len(which)) - first[which]) / counts[which]
-    return cubic.evaluate(curves[which], along)
+    return cubic.subdivide(curves, cubic.pieces(curves @ metric.T, tolerance, MOST_PIECES))
 
 
 def nearest(contour: Contour, at: Vec2, metric: FloatArray = UNIT) -> tuple[float, int, float]:
@@ -210,8 +184,7 @@ def nearest(contour: Contour, at: Vec2, metric: FloatArray = UNIT) -> tuple[floa
 
     Notes
     -----
-    Straight segments exactly; of a curve the best of 33 places, then Newton on
-    the squared distance, kept within the two neighbouring places.
+    Straight segments exactly, curves by `app.curves.nearest`.
     """
     target = metric @ np.asarray(at, dtype=np.float64)
     curves = curves_of(contour) @ metric.T
@@ -221,32 +194,11 @@ def nearest(contour: Contour, at: Vec2, metric: FloatArray = UNIT) -> tuple[floa
     along = np.clip(along, 0.0, 1.0)
     bent = np.flatnonzero(~straight_segments(contour))
     if len(bent):
-        along[bent] = _nearest_on_curves(curves[bent], target)
+        along[bent] = cubic.nearest(curves[bent], target)
     on = cubic.evaluate(curves, along)
     distances = np.sqrt(((on - target) ** 2).sum(-1))
     best = int(distances.argmin())
     return float(distances[best]), best, float(along[best])
-
-
-def _nearest_on_curves(curves: FloatArray, target: FloatArray) -> FloatArray:
-    places = np.linspace(0.0, 1.0, 33)
-    sampled = cubic.evaluate(curves[:, None], places)
-    first = ((sampled - target) ** 2).sum(-1).argmin(-1)
-    low, high = places[np.maximum(first - 1, 0)], places[np.minimum(first + 1, 32)]
-    at = places[first]
-    second = 6.0 * np.diff(curves, n=2, axis=1)
-    for _ in range(12):
-        away = cubic.evaluate(curves, at) - target
-        speed = cubic.derivative(curves, at)
-        turn = second[:, 0] + at[:, None] * (second[:, 1] - second[:, 0])
-        slope = (away * speed).sum(-1)
-        rise = (speed**2).sum(-1) + (away * turn).sum(-1)
-        # Uphill (rise <= 0) Newton would run to a maximum; bisect towards lower distance there.
-        low, high = np.where(slope < 0.0, at, low), np.where(slope > 0.0, at, high)
-        step = at - slope / np.where(rise > 0.0, rise, 1.0)
-        inside = (rise > 0.0) & (step >= low) & (step <= high)
-        at = np.where(inside, step, 0.5 * (low + high))
-    return np.asarray(at)
 
 
 # Points and handles
@@ -269,7 +221,7 @@ def move_point(contour: Contour, index: int, to: Vec2, metric: FloatArray = UNIT
         if straight[segment]:
             curves[segment] = line_as_cubic(curves[segment, 0], curves[segment, 3])
     near = {before, index, (index + 1) % count}
-    kinds = _aligned_withline_as_cubic(curves, kinds_of(contour), straight, near, metric)
+    kinds = _in_line_with_straight(curves, kinds_of(contour), straight, near, metric)
     return _chain(curves, kinds)
 
 
@@ -306,7 +258,7 @@ def move_handle(
         kinds[owner] = "corner"
     if kinds[owner] != "corner" and other[0] != segment and is_straight(curves[other[0]]):
         far = curves[other[0], 0 if other[1] == 2 else 3]
-        line = _unit(metric @ (anchor - far))
+        line = unit(metric @ (anchor - far))
         way = line * max(float(way @ line), 0.0)
         curves[segment, which] = anchor + to_plane @ way
         return _chain(curves, kinds)
@@ -314,8 +266,8 @@ def move_handle(
     if kinds[owner] == "symmetric":
         curves[other] = 2.0 * anchor - np.asarray(to, dtype=np.float64)
     elif kinds[owner] == "smooth" and way.any():
-        size = _length(metric @ (curves[other] - anchor))
-        curves[other] = anchor - to_plane @ (_unit(way) * size)
+        size = length(metric @ (curves[other] - anchor))
+        curves[other] = anchor - to_plane @ (unit(way) * size)
     return _chain(curves, kinds)
 
 
@@ -348,8 +300,8 @@ def set_kind(
     from_previous = metric @ (anchor - curves[before, 0])
     to_next = metric @ (curves[index, 3] - anchor)
     lengths = [
-        _length(into) or _length(from_previous) / 3.0,
-        _length(out) or _length(to_next) / 3.0,
+        length(into) or length(from_previous) / 3.0,
+        length(out) or length(to_next) / 3.0,
     ]
     lines = is_straight(curves[[before, index]])
     if lines.all():
@@ -357,12 +309,12 @@ def set_kind(
     elif lines.any():
         direction = from_previous if lines[0] else to_next
     else:
-        direction = _unit(into) + _unit(out)
-        if _length(direction) <= KINK:
+        direction = unit(into) + unit(out)
+        if length(direction) <= KINK:
             direction = from_previous + to_next
-    if _length(direction) <= KINK * sum(lengths):
+    if length(direction) <= KINK * sum(lengths):
         direction = np.array([-into[1], into[0]])  # a spike: across it
-    direction = _unit(direction)
+    direction = unit(direction)
     if kind == "symmetric":
         lengths = [sum(lengths) / 2.0] * 2
     to_plane = np.linalg.inv(metric)
@@ -421,7 +373,7 @@ def remove(contour: Contour, index: int) -> Contour | None:
     if straight[before] and straight[index]:
         merged = line_as_cubic(curves[before, 0], curves[index, 3])
     else:
-        merged = _merged(curves[before], curves[index])
+        merged = cubic.merged(curves[before], curves[index])
     curves[before] = merged
     kept = [i for i in range(count) if i != index]
     curves = curves[kept]
@@ -529,24 +481,14 @@ def to_polygon(contour: Contour, tolerance: float, metric: FloatArray = UNIT) ->
     if isinstance(contour, PolygonContour):
         return contour
     curves = curves_of(contour)
-    counts = pieces(curves @ metric.T, tolerance)
+    counts = cubic.pieces(curves @ metric.T, tolerance, MOST_PIECES)
     if counts.sum() < 3:
         counts[:] = 3
-    points = subdivide(curves, counts).tolist()
+    points = cubic.subdivide(curves, counts).tolist()
     return PolygonContour(tuple((s, t) for s, t in points))
 
 
 # Inside
-
-
-def _length(vector: FloatArray) -> float:
-    return math.hypot(*vector.tolist())
-
-
-def _unit(vector: FloatArray) -> FloatArray:
-    """Return the direction of a vector, zero for the zero vector."""
-    size = _length(vector)
-    return vector / size if size > 0.0 else vector
 
 
 def _chain(curves: FloatArray, kinds: Iterable[AnchorKind]) -> BezierContour:
@@ -568,17 +510,17 @@ def _weakened(
     for index in indices:
         into = curves[index, 0] - curves[index - 1, 2]
         out = curves[index, 1] - curves[index, 0]
-        size = min(_length(into), _length(out))
-        if result[index] == "symmetric" and _length(into - out) > UNEQUAL * size:
+        size = min(length(into), length(out))
+        if result[index] == "symmetric" and length(into - out) > UNEQUAL * size:
             result[index] = "smooth"
         if result[index] == "smooth":
-            gap = _length(_unit(into) - _unit(out))
+            gap = length(unit(into) - unit(out))
             if size == 0.0 or gap > KINK:
                 result[index] = "corner"
     return result
 
 
-def _aligned_withline_as_cubic(
+def _in_line_with_straight(
     curves: FloatArray,
     kinds: Iterable[AnchorKind],
     straight: NDArray[np.bool_],
@@ -596,66 +538,9 @@ def _aligned_withline_as_cubic(
             continue
         anchor = curves[index, 0]
         far = curves[before, 0] if straight[before] else curves[index, 3]
-        away = _unit(metric @ (anchor - far))
+        away = unit(metric @ (anchor - far))
         handle = (index, 1) if straight[before] else (before, 2)
-        size = _length(metric @ (curves[handle] - anchor))
+        size = length(metric @ (curves[handle] - anchor))
         curves[handle] = anchor + to_plane @ (away * size)
         result[index] = "smooth"
     return result
-
-
-def _tangents(curves: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return unit directions (2,) from both ends of a chain of control points (n, 2) inwards."""
-    ends = []
-    for points in (curves, curves[::-1]):
-        ways = points[1:] - points[0]
-        sizes = np.sqrt((ways**2).sum(-1))
-        found = np.flatnonzero(sizes > 1e-12 * max(float(sizes.max()), 1e-300))
-        ends.append(_unit(ways[found[0]]) if len(found) else np.zeros(2))
-    return ends[0], ends[1]
-
-
-def _merged(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the cubic (4, 2) that comes nearest to two that meet.
-
-    Notes
-    -----
-    Its ends and directions there are theirs; the lengths of its handles are the
-    least-squares solution over 32 samples a curve, whose parameters are put at
-    the nearest points between rounds: Schneider, An Algorithm for Automatically
-    Fitting Digitized Curves, Graphics Gems (1990). The first parameters are
-    those of a split, so that a curve that was split is found at once.
-    """
-    start, end = before[0], after[3]
-    head, tail = _tangents(np.concatenate([before, after[1:]]))
-    left, right = _length(before[3] - before[2]), _length(after[1] - after[0])
-    if not left + right > 0.0:
-        left, right = _length(before[3] - before[0]), _length(after[3] - after[0])
-    share = left / (left + right) if left + right > 0.0 else 0.5
-    share = min(max(share, 0.02), 0.98)
-    along = np.linspace(0.0, 1.0, 33)
-    samples = np.concatenate([cubic.evaluate(before, along), cubic.evaluate(after, along[1:])])
-    places = np.concatenate([share * along, share + (1.0 - share) * along[1:]])
-    span = _length(end - start) or _length(before[3] - start)
-    best, least = line_as_cubic(start, end), math.inf
-    for _ in range(8):
-        rest = 1.0 - places
-        fixed = cubic.evaluate(np.stack([start, start, end, end]), places)
-        inner = 3.0 * np.stack([places * rest**2, places**2 * rest], axis=-1)
-        system = inner[:, None, :] * np.stack([head, tail], axis=-1)
-        sizes = np.linalg.lstsq(system.reshape(-1, 2), (samples - fixed).reshape(-1), rcond=1e-12)[
-            0
-        ]
-        sizes = np.where(sizes > 1e-3 * span, sizes, span / 3.0)
-        curve = np.stack([start, start + sizes[0] * head, end + sizes[1] * tail, end])
-        miss = cubic.evaluate(curve, places) - samples
-        error = float((miss**2).sum())
-        if error < least:
-            best, least = curve, error
-        if error <= 1e-24 * span**2:
-            break
-        speed = cubic.derivative(curve, places)
-        squares = (speed**2).sum(-1)
-        shift = (miss * speed).sum(-1) / np.where(squares > 0.0, squares, 1.0)
-        places = np.clip(places - shift, 0.0, 1.0)
-    return best

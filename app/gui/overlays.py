@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from app import camera_control as control
 from app import contours, lights, planes
+from app.curves import pieces, subdivide
 from app.gui import theme
 from app.scene import AnchorKind, AreaLight, Camera, Plane, Vec2, Vec3
 from app.vectors import add, scale
@@ -81,7 +82,7 @@ class Sight:
         focal = 0.5 * self.view.height / np.tan(0.5 * self.camera.fov_y)
         nearest = np.nan_to_num(screen[..., 2], nan=control.NEAR).min(-1)
         metric = planes.metric_from_plane(plane)
-        counts = contours.pieces(curves @ metric.T, FLAT * nearest / focal)
+        counts = pieces(curves @ metric.T, FLAT * nearest / focal, contours.MOST_PIECES)
         low, high = screen[..., :2].min(1), screen[..., :2].max(1)
         corner = np.array([self.view.x, self.view.y])
         size = np.array([self.view.width, self.view.height])
@@ -119,7 +120,7 @@ class Canvas:
         rim, ink = theme.u32(theme.grey(0.0), 0.55 * alpha), theme.u32(colour, alpha)
         segments = contours.segments_of(light.outline)
         counts = self.sight.piece_counts(segments.curves, light.plane)
-        world = on_plane(light.plane, contours.subdivide(segments.curves, counts))
+        world = on_plane(light.plane, subdivide(segments.curves, counts))
         screen = self.sight.view.project_all(self.sight.camera, world)
         ends = np.concatenate([[0], np.cumsum(counts)])[list(segments.starts)]
         for first, last in pairwise(ends.tolist()):
