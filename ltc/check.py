@@ -500,7 +500,8 @@ class _Doctor:
             change = np.linalg.det(h / np.linalg.norm(h[..., 2], axis=-1)[:, None, None])
             change /= np.linalg.det(m / np.linalg.norm(m[..., 2], axis=-1)[:, None, None])
             lost = ~((change < _HALF_FACTOR) & (change > 1.0 / _HALF_FACTOR))
-        apart = variation(m[~lost][:2000], h[~lost][:2000], self.rng)
+        some = self.rng.permutation(np.flatnonzero(~lost))[:_LOBES]
+        apart = variation(m[some], h[some], self.rng) if some.size else np.ones(1)
         figure = _variation_figure(apart)
         if np.any(lost):
             first = self.place(int(np.flatnonzero(self.good)[np.argmax(lost)]))
