@@ -6,19 +6,25 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ltc import anisotropic_fit, fit
 from ltc.anisotropic import AXES, AnisotropicTable
 from ltc.anisotropic_fit import fit_anisotropic
 from ltc.fit import fit_isotropic
 from ltc.fitting import checkpoint_path
+from ltc.sliced_wasserstein import SHAPE, PublishedTable, fit_published, published_files
 from ltc.table import IsotropicTable
 
-_Fit = Callable[[argparse.Namespace, Callable[[str], None]], IsotropicTable | AnisotropicTable]
+_Report = Callable[[str], None]
+_Table = IsotropicTable | AnisotropicTable | PublishedTable
+_Fit = Callable[[argparse.Namespace, _Report], _Table]
 
 
 def _shape(text: str) -> tuple[int, ...]:
@@ -40,43 +46,47 @@ def add_parser(commands: Any) -> None:
         "fit", help="fit a table to GGX", description="Fit a table to GGX."
     )
     tables = parser.add_subparsers(dest="table", metavar="TABLE", required=True)
-    for name, words, configurations in (
-        ("isotropic", "equal alphas", fit.CONFIGURATIONS),
-        ("anisotropic", "an alpha along each axis", anisotropic_fit.CONFIGURATIONS),
+    for name, words, suffix in (
+        ("isotropic", "equal alphas", ".npz"),
+        ("anisotropic", "an alpha along each axis", ".npz"),
+        ("published", "as KT et al. 2022 did, in their layout", ".npy"),
     ):
         table = tables.add_parser(
             name,
             help=words,
-            description=f"Fit the {name} table. Interrupted, the same command continues.",
-            epilog=f"example: python -m ltc fit {name} --output ltc_{name}.npz --seed 7",
+            description=f"Fit the {name} table: {words}. Interrupted, the same command continues.",
+            epilog=f"example: python -m ltc fit {name} --output ltc_{name}{suffix} --seed 7",
             formatter_class=argparse.ArgumentDefaultsHelpFormatter,
         )
         table.add_argument(
-            "--output", type=Path, default=Path(f"ltc_{name}.npz"), help="file to write"
+            "--output", type=Path, default=Path(f"ltc_{name}{suffix}"), help="file to write"
         )
         if name == "isotropic":
             table.add_argument("--size", type=int, default=fit.SIZE, help="nodes an axis, 4 to 32")
         else:
-            axes = ", ".join(AXES)
+            axes = ", ".join(AXES) if name == "anisotropic" else "alpha, lambda, theta, phi"
+            shape = anisotropic_fit.SHAPE if name == "anisotropic" else SHAPE
             table.add_argument(
                 "--shape",
                 type=_shape,
-                default=_text(anisotropic_fit.SHAPE),
-                help=f"nodes of the residual along {axes}, 2 to 64 each",
+                default=_text(shape),
+                help=f"nodes along {axes}, 2 to 64 each",
             )
+            table.add_argument(
+                "--workers", type=int, default=min(os.cpu_count() or 1, 8), help="processes"
+            )
+        if name == "anisotropic":
             table.add_argument(
                 "--albedo-shape",
                 type=_shape,
                 default=_text(anisotropic_fit.ALBEDO_SHAPE),
                 help="the same of albedo and Fresnel term",
             )
-            table.add_argument(
-                "--workers", type=int, default=min(os.cpu_count() or 1, 8), help="processes"
-            )
         table.add_argument("--seed", type=int, default=1, help="of all randomness")
-        table.add_argument(
-            "--configurations", type=int, default=configurations, help="rectangles to fit to"
-        )
+        if name != "published":
+            table.add_argument(
+                "--configurations", type=int, default=fit.CONFIGURATIONS, help="rectangles fitted"
+            )
         again = table.add_mutually_exclusive_group()
         again.add_argument(
             "--resume", action="store_true", help="insist on continuing an interrupted fit"
@@ -100,7 +110,7 @@ def _print_error(figures: dict[str, Any]) -> None:
                 print(f"  mean by {axis}  {bins}")
 
 
-def _isotropic(arguments: argparse.Namespace, report: Callable[[str], None]) -> IsotropicTable:
+def _isotropic(arguments: argparse.Namespace, report: _Report) -> IsotropicTable:
     return fit_isotropic(
         arguments.output,
         arguments.size,
@@ -111,24 +121,44 @@ def _isotropic(arguments: argparse.Namespace, report: Callable[[str], None]) -> 
     )
 
 
-def _anisotropic(arguments: argparse.Namespace, report: Callable[[str], None]) -> AnisotropicTable:
-    settings = (
-        arguments.output,
-        arguments.shape,
-        arguments.albedo_shape,
-        arguments.seed,
-        arguments.configurations,
-        _resume(arguments),
-        report,
-    )
-    if arguments.workers < 1:
-        raise ValueError(f"workers is {arguments.workers}, expected 1 or more")
-    if arguments.workers == 1:
-        return fit_anisotropic(*settings)
+def _anisotropic(arguments: argparse.Namespace, report: _Report) -> AnisotropicTable:
+    with _workers(arguments.workers) as executor:
+        return fit_anisotropic(
+            arguments.output,
+            arguments.shape,
+            arguments.albedo_shape,
+            arguments.seed,
+            arguments.configurations,
+            _resume(arguments),
+            report,
+            executor,
+        )
+
+
+def _published(arguments: argparse.Namespace, report: _Report) -> PublishedTable:
+    with _workers(arguments.workers) as executor:
+        return fit_published(
+            arguments.output,
+            arguments.shape,
+            arguments.seed,
+            resume=_resume(arguments),
+            report=report,
+            executor=executor,
+        )
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[ProcessPoolExecutor | None]:
+    """Yield so many processes, or None for one."""
+    if count < 1:
+        raise ValueError(f"workers is {count}, expected 1 or more")
+    if count == 1:
+        yield None
+        return
     # Ctrl-C reaches the workers too; only this process shall answer it.
-    executor = ProcessPoolExecutor(arguments.workers, initializer=_ignore_interrupts)
+    executor = ProcessPoolExecutor(count, initializer=_ignore_interrupts)
     try:
-        return fit_anisotropic(*settings, executor)
+        yield executor
     finally:
         executor.shutdown(cancel_futures=True)
 
@@ -141,7 +171,11 @@ def _resume(arguments: argparse.Namespace) -> bool | None:
     return True if arguments.resume else False if arguments.fresh else None
 
 
-_FITS: dict[str, _Fit] = {"isotropic": _isotropic, "anisotropic": _anisotropic}
+_FITS: dict[str, _Fit] = {
+    "isotropic": _isotropic,
+    "anisotropic": _anisotropic,
+    "published": _published,
+}
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -166,6 +200,14 @@ def run(arguments: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         report(f"interrupted; the same command continues from {checkpoint_path(output)}")
         return 130
+    if isinstance(table, PublishedTable):
+        losses = table.losses
+        print(
+            "sliced Wasserstein distance"
+            f"  mean {losses.mean():.5f}  median {np.median(losses):.5f}  max {losses.max():.5f}"
+        )
+        print(" ".join(str(path) for path in published_files(output)))
+        return 0
     _print_error(table.provenance["error"])
     print(f"{output}: {table.payload} bytes of tables")
     return 0

@@ -156,6 +156,7 @@ def complete(
     arguments: Callable[[slice], tuple[Any, ...]],
     report: Report,
     executor: Executor | None = None,
+    chunk: int | None = None,
 ) -> None:
     """Complete the targets ``work.arrays[name]``, saving them now and then.
 
@@ -175,10 +176,13 @@ def complete(
         Takes lines of progress.
     executor : concurrent.futures.Executor, optional
         Computes the pieces; by default they are computed here.
+    chunk : int, optional
+        Targets per piece; by default CHUNK.
     """
+    size = chunk or CHUNK
     first = len(work.arrays[name]) if name in work.arrays else 0
     start = done = first
-    parts = [slice(i, min(i + CHUNK, count)) for i in range(first, count, CHUNK)]
+    parts = [slice(i, min(i + size, count)) for i in range(first, count, size)]
     begin_time, saved = time.monotonic(), 0.0
     pieces = [work.arrays[name]] if first else []
     try:
