@@ -1,5 +1,6 @@
 """The published fit: samples, distance, derivatives, alignment, symmetries, any BRDF."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ltc import __main__ as command_line
-from ltc import brdf, fitting, transform
+from ltc import fitting, transform
 from ltc import sliced_wasserstein as sw
 from ltc.sliced_wasserstein import Brdf, SlicedWasserstein, fit_lobe, fit_published, ggx
 
@@ -28,43 +29,15 @@ def lambertian(alpha_x: float, alpha_y: float) -> Brdf:
     return Brdf(density, sample, density)
 
 
-def beckmann(alpha_x: float, alpha_y: float) -> Brdf:
-    """Return Beckmann's distribution with height-correlated Smith, sampled by its normals."""
+def _example() -> dict[str, Any]:
+    """Run the worked example of docs/fitting.md and return what it defines."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "fitting.md").read_text("utf-8")
+    found: dict[str, Any] = {}
+    exec(re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0], found)
+    return found
 
-    def slopes(h: FloatArray) -> FloatArray:
-        return (h[..., 0] / alpha_x) ** 2 + (h[..., 1] / alpha_y) ** 2
 
-    def ndf(h: FloatArray) -> FloatArray:
-        z2 = np.maximum(h[..., 2], 1e-9) ** 2
-        return np.exp(-np.minimum(slopes(h) / z2, 600.0)) / (np.pi * alpha_x * alpha_y * z2**2)
-
-    def smith(w: FloatArray) -> FloatArray:
-        tangent2 = (alpha_x * w[..., 0]) ** 2 + (alpha_y * w[..., 1]) ** 2
-        a = w[..., 2] / np.sqrt(np.maximum(tangent2, 1e-12))
-        rational = (1.0 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a)
-        return np.where(a < 1.6, rational, 0.0)
-
-    def half(wo: FloatArray, wi: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        up = wi[..., 2] > 1e-6
-        wi = np.where(up[..., None], wi, np.array([0.0, 0.0, 1.0]))
-        return up, wi, brdf.half_vector(np.broadcast_to(wo, wi.shape), wi)
-
-    def evaluate(wo: FloatArray, wi: FloatArray) -> FloatArray:
-        up, wi, h = half(wo, wi)
-        g2 = 1.0 / (1.0 + smith(wo) + smith(wi))
-        return np.where(up, ndf(h) * g2 / (4.0 * wo[..., 2]), 0.0)
-
-    def sample(wo: FloatArray, u: FloatArray) -> FloatArray:
-        radius, phi = np.sqrt(-np.log1p(-u[..., 0])), 2.0 * np.pi * u[..., 1]
-        x, y = alpha_x * radius * np.cos(phi), alpha_y * radius * np.sin(phi)
-        h = np.stack([-x, -y, np.ones_like(x)], axis=-1)
-        return brdf.reflect(wo, h / np.linalg.norm(h, axis=-1, keepdims=True))
-
-    def pdf(wo: FloatArray, wi: FloatArray) -> FloatArray:
-        up, _, h = half(wo, wi)
-        return np.where(up, ndf(h) * h[..., 2] / (4.0 * np.sum(wo * h, axis=-1)), 0.0)
-
-    return Brdf(evaluate, sample, pdf, bound=4.0)
+beckmann = _example()["beckmann"]
 
 
 class TestSamples:
