@@ -18,12 +18,13 @@ from app.cli.common import (
     headless_renderer,
     messages,
     named_scene,
+    whole_number,
 )
 from app.errors import InputError, nearest, os_reason, require_file
 from app.files import check_output, replace_file
 from app.json_reader import LARGEST_NUMBER
 from app.render.techniques import AUTOMATIC, find_technique, suited_technique
-from app.scene import ALPHA_MIN, RenderSettings
+from app.scene import ALPHA_MIN, MAX_SAMPLES, RenderSettings
 
 FloatArray = NDArray[np.float64]
 
@@ -46,6 +47,15 @@ def probe(
         Path, typer.Option("--output", "-o", metavar="OUT.npz", help="File of results to write.")
     ],
     technique: TechniqueOption = AUTOMATIC,
+    samples: Annotated[
+        int,
+        typer.Option(
+            "--samples",
+            metavar="N",
+            help="Estimates to average at each point, with technique reference.",
+            parser=whole_number("--samples", 1, MAX_SAMPLES),
+        ),
+    ] = 64,
 ) -> None:
     """Shade given points on the GPU with the functions of the lighting pass.
 
@@ -68,7 +78,7 @@ def probe(
     count = len(arrays["position"])
     anisotropic = int(np.count_nonzero(arrays["alpha"][:, 0] != arrays["alpha"][:, 1]))
     technique = suited_technique(technique, anisotropic > 0)
-    settings = RenderSettings(technique=technique)
+    settings = RenderSettings(technique, samples)
     if anisotropic and not find_technique(technique).anisotropic:
         messages().print(
             f"{anisotropic} of {count} points are anisotropic: technique {technique} shades them "

@@ -164,7 +164,7 @@ class LightingFeatures:
         (or nothing is shaded).
     technique : str
         Whose shaders are included; the default one's where nothing is glossy, because
-        diffuse reflection is the same in all but those that take curves whole.
+        diffuse reflection is the same in all but those that take curves whole or sample.
     tangents : bool
         Some glossy material is anisotropic, and the technique shades it so.
     counts : bool
@@ -211,7 +211,9 @@ class LightingFeatures:
             lights,
             rounded if fits else 0,
             lights.technique(technique)
-            if specular or lights.curves == "whole"
+            if specular
+            or lights.curves == "whole"
+            or (diffuse and find_technique(technique).is_sampled)
             else DEFAULT_TECHNIQUE,
             specular
             and find_technique(technique).anisotropic
@@ -259,6 +261,9 @@ def technique_defines(technique: str) -> dict[str, int]:
     choice = parse_technique(technique)
     defines = {
         "TECHNIQUE_GGX": int(choice.name == "ggx"),
+        "TECHNIQUE_REFERENCE": int(choice.name == "reference"),
+        "TAKES_TANGENT": int(choice.technique.anisotropic),
+        "HAS_TABLES": int(choice.technique.has_tables),
         "CURVE_RULE": choice.technique.curve_rule,
         "CURVE_NODES": choice.curve_nodes,
     }

@@ -129,6 +129,7 @@ class LightingPass:
             set_uniform(program, "history", HISTORY)
             history.use(HISTORY)
         set_uniform(program, "sample_weight", 1.0 / (sample + 1))
+        set_uniform(program, "sample_index", sample)
         corner = (
             frame.forward
             + (2.0 * offset[0] / width - 1.0) * frame.right
@@ -151,12 +152,16 @@ class LightingPass:
         tangent: NDArray[np.float32],
         view: NDArray[np.float32],
         alpha: NDArray[np.float32],
+        samples: int = 1,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return (specular, diffuse), each (n, 3), of a white material at n points."""
+        """Return (specular, diffuse), each (n, 3), of a white material at n points.
+
+        They are the mean of ``samples`` estimates, of a technique that samples.
+        """
         program = self._programs.get(probe_spec(needs, technique))
         batch = PROBE_SIDE * PROBE_SIDE
         pieces = [
-            self._probe_batch(program, [a[start : start + batch] for a in inputs])
+            self._probe_batch(program, [a[start : start + batch] for a in inputs], samples)
             for inputs in [(position, normal, tangent, view, alpha)]
             for start in range(0, len(position), batch)
         ]
@@ -166,7 +171,7 @@ class LightingPass:
         return specular, diffuse
 
     def _probe_batch(
-        self, program: moderngl.Program, inputs: list[NDArray[np.float32]]
+        self, program: moderngl.Program, inputs: list[NDArray[np.float32]], samples: int
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         count = len(inputs[0])
         width = min(count, PROBE_SIDE)
@@ -191,11 +196,14 @@ class LightingPass:
             stack.callback(release_framebuffer, target)
             begin_pass(target, (width, height))
             self._bind_shading(program)
-            self._triangle.draw(program)
-            specular, diffuse = (
-                np.frombuffer(output.read(), dtype=np.float32).reshape(-1, 4)[:count, :3]
-                for output in outputs
-            )
+            sums = np.zeros((2, count, 3))
+            for sample in range(samples):
+                set_uniform(program, "sample_index", sample)
+                self._triangle.draw(program)
+                for total, output in zip(sums, outputs, strict=True):
+                    texels = np.frombuffer(output.read(), dtype=np.float32).reshape(-1, 4)
+                    total += texels[:count, :3]
+            specular, diffuse = (sums / samples).astype(np.float32)
             return specular, diffuse
 
     def _bind_shading(self, program: moderngl.Program) -> None:

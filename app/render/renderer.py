@@ -378,7 +378,8 @@ class Renderer:
         -------
         dict
             ``"specular"`` and ``"diffuse"``, (n, 3) float32 radiance: F = 1 and
-            albedo 1, summed over the scene's lights.
+            albedo 1, summed over the scene's lights. Of a technique that samples, the
+            mean of ``settings.samples``.
 
         Raises
         ------
@@ -410,7 +411,8 @@ class Renderer:
         self._hold_lights(scene, needs)
         if find_technique(technique).has_tables:
             self._lighting.load_tables()
-        specular, diffuse = self._lighting.probe(needs, technique, **arrays)
+        samples = settings.samples if find_technique(technique).is_sampled else 1
+        specular, diffuse = self._lighting.probe(needs, technique, **arrays, samples=samples)
         return {"specular": specular, "diffuse": diffuse}
 
     def timings(self, *, wait: bool = True) -> dict[str, float]:

@@ -39,11 +39,15 @@ class Technique:
         Whether it shades alpha_x apart from alpha_y, and so reads tangents.
     has_tables : bool
         Whether its specular part looks up the tables of `app.render.tables`.
+    is_sampled : bool
+        Whether a sample of a pixel is a random estimate that others must be averaged with,
+        rather than the result.
     curves : {"tree", "whole", "edges"}
         How it takes curves: cut into a tree of pieces that turn little; each as it is; or as
         so many edges as its number says, which makes polygons of them.
     curve_rule : int
-        The feature CURVE_RULE: how it integrates along curves that are whole.
+        The feature CURVE_RULE: how it integrates along curves that are whole. The number of
+        a technique that does not is only not 0, which leaves out the tree's own rule.
     parameter : Parameter, optional
         What a number behind its name means.
     """
@@ -53,6 +57,7 @@ class Technique:
     has_tables: bool
     curves: Literal["tree", "whole", "edges"] = "tree"
     curve_rule: int = 0
+    is_sampled: bool = False
     parameter: Parameter | None = None
 
 
@@ -93,6 +98,15 @@ TECHNIQUES: dict[str, Technique] = {
         curves="edges",
         parameter=Parameter("edges a curve", 1, 4096, 18),
     ),
+    "reference": Technique(
+        "GGX and Lambert estimated by random directions, without bias but with noise: what "
+        "many samples converge to is exact",
+        anisotropic=True,
+        has_tables=False,
+        curves="whole",
+        curve_rule=3,
+        is_sampled=True,
+    ),
 }
 """By name, in the order in which help lists them."""
 
@@ -128,7 +142,7 @@ class Choice(NamedTuple):
     @property
     def follows_ltc(self) -> bool:
         """Whether it is ``ltc`` but for how it takes curves."""
-        return self.technique.curves != "tree"
+        return self.technique.curves != "tree" and not self.technique.is_sampled
 
     @property
     def curve_nodes(self) -> int:

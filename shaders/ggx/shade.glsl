@@ -2,9 +2,9 @@
 // anisotropic, without tables. Specular by ggx/polygon.glsl, Lambert by ltc/contour.glsl.
 // Twin: ltc.ggx.ggx_specular.
 
-#include "common/frame.glsl"
 #include "common/light_data.glsl"
 #include "common/material.glsl"
+#include "common/tangent_frame.glsl"
 #include "ltc/contour.glsl"
 #if HAS_SPECULAR
 #include "ggx/polygon.glsl"
@@ -39,15 +39,6 @@ GgxTerms ggx_terms(
         light_winding(plane) * light_form_factor(light, diffuse, plane, normal), 0.0, 1.0);
 #endif
     return terms;
-}
-
-// Columns: the tangent made perpendicular to the normal, the bitangent, the normal.
-mat3 tangent_frame(vec3 normal, vec3 tangent)
-{
-    vec3 x = tangent - normal * dot(normal, tangent);
-    float x2 = dot(x, x);
-    x = x2 > 1e-12 ? x * inversesqrt(x2) : any_tangent(normal);
-    return mat3(x, cross(normal, x), normal);
 }
 
 // Radiance towards wo. `normal`, `tangent` and `wo` are unit and leave the surface; alpha.x

@@ -136,26 +136,6 @@ float light_form_factor(
 
 #endif
 
-// Whether a point at this depth sees a light's dark side, or only its edge.
-bool shows_nothing(PlanarLight light, float depth)
-{
-#if !HAS_TWO_SIDED
-    return depth >= 0.0;
-#elif !HAS_ONE_SIDED
-    return depth == 0.0;
-#else
-    return depth == 0.0 || (depth > 0.0 && !light.two_sided);
-#endif
-}
-
-// Whether a light sends nothing to a point: it shows its dark side, or all of it is
-// below the surface, since its disc's highest point is.
-bool is_unseen(PlanarLight light, PlaneView view, vec3 normal)
-{
-    float reach = light.radius * length(cross(normal, light.n));
-    return shows_nothing(light, view.depth) || dot(normal, view.offset) + reach <= 0.0;
-}
-
 // Seen from its emitting side an outline runs counter-clockwise, which is clockwise
 // about +z of a point's frame: the sign that makes its integral positive.
 float light_winding(PlaneView view)

@@ -10,6 +10,8 @@
 #include "common/frame.glsl"
 #if TECHNIQUE_GGX
 #include "ggx/shade.glsl"
+#elif TECHNIQUE_REFERENCE
+#include "reference/shade.glsl"
 #else
 #include "ltc/shade.glsl"
 #endif
@@ -29,7 +31,10 @@ uniform vec3 ray_corner;
 uniform vec3 ray_dx;
 uniform vec3 ray_dy;
 uniform int light_count;
-#if HAS_SPECULAR && !TECHNIQUE_GGX
+#if TECHNIQUE_REFERENCE
+uniform uint sample_index;
+#endif
+#if HAS_SPECULAR && HAS_TABLES
 uniform sampler2D table_residual;
 uniform sampler2D table_albedo;
 #endif
@@ -47,7 +52,7 @@ vec3 material_tangent(ivec2 pixel, vec3 normal, int object)
     float rotation = material_rotation_of_object(object);
     return cos(rotation) * t + sin(rotation) * cross(normal, t);
 }
-#elif TECHNIQUE_GGX
+#elif TAKES_TANGENT
 vec3 material_tangent(ivec2 pixel, vec3 normal, int object)
 {
     return any_tangent(normal);
@@ -70,9 +75,13 @@ vec3 surface_radiance(vec4 surface)
     vec3 normal = facing_normal(direction_from_octahedral(surface.xy), wo);
     vec3 position = eye + surface.z * ray;
     MaterialSample material = material_of_object(int(surface.w));
-#if TECHNIQUE_GGX
+#if TAKES_TANGENT
     vec3 tangent = material_tangent(ivec2(gl_FragCoord.xy), normal, int(surface.w));
-    return shade_lights(light_count, position, normal, tangent, wo, material);
+    return shade_lights(
+#if TECHNIQUE_REFERENCE
+        uvec3(gl_FragCoord.xy, sample_index),
+#endif
+        light_count, position, normal, tangent, wo, material);
 #else
     return shade_lights(
 #if HAS_SPECULAR

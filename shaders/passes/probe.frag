@@ -3,6 +3,8 @@
 #include "passes/light_storage.glsl"
 #if TECHNIQUE_GGX
 #include "ggx/shade.glsl"
+#elif TECHNIQUE_REFERENCE
+#include "reference/shade.glsl"
 #else
 #include "ltc/shade.glsl"
 #endif
@@ -11,13 +13,16 @@ uniform sampler2D positions;  // world [m]
 uniform sampler2D normals;    // unit
 uniform sampler2D views;      // unit, to the viewer
 uniform sampler2D alphas;     // (alpha_x, alpha_y)
-#if TECHNIQUE_GGX
+#if TAKES_TANGENT
 uniform sampler2D tangents;   // unit, perpendicular to the normal
 #else
 uniform sampler2D table_residual;
 uniform sampler2D table_albedo;
 #endif
 uniform int light_count;
+#if TECHNIQUE_REFERENCE
+uniform uint sample_index;
+#endif
 
 layout(location = 0) out vec4 specular;
 layout(location = 1) out vec4 diffuse;
@@ -31,9 +36,13 @@ void main()
     vec2 alpha = texelFetch(alphas, place, 0).xy;
     vec3 specular_radiance;
     vec3 diffuse_radiance;
-#if TECHNIQUE_GGX
+#if TAKES_TANGENT
     vec3 tangent = texelFetch(tangents, place, 0).xyz;
-    probe_lights(light_count, position, normal, tangent, wo, alpha,
+    probe_lights(
+#if TECHNIQUE_REFERENCE
+                 uvec3(place, sample_index),
+#endif
+                 light_count, position, normal, tangent, wo, alpha,
                  specular_radiance, diffuse_radiance);
 #else
     probe_lights(table_residual, table_albedo, light_count, position, normal, wo, alpha,

@@ -44,7 +44,6 @@ TWINS = {
     "half_vector_edge",
     "area_tangent",
     "double_cosine_of_third",
-    "tangent_frame",
     "probe_lights",
     "shade_lights",
 }
