@@ -25,6 +25,7 @@ from app.cli.bench import bench
 from app.cli.common import FailureError, messages, scene_path
 from app.cli.explain import explain
 from app.cli.probe import probe
+from app.cli.report import report
 from app.cli.shot import shot
 from app.errors import InputError, nearest, os_reason
 from app.scene import SceneError
@@ -136,6 +137,7 @@ def window(
 app.command()(shot)
 app.command()(probe)
 app.command()(bench)
+app.command()(report)
 app.command()(explain)
 
 

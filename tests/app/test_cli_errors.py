@@ -432,6 +432,31 @@ CASES: dict[str, Case] = {
     "bench's second technique": bad_arguments(
         "bench", "scene.json", "--technique", "ltc", "--technique", "x", parts=("'x'",)
     ),
+    "report of a missing scene": bad_arguments(
+        "report", "gone.json", "-o", "out", parts=("gone.json", "no such file")
+    ),
+    "report nowhere": bad_arguments("report", "scene.json", parts=("--output", "report --help")),
+    "report into no folder": bad_arguments(
+        "report", "scene.json", "-o", "no/out", parts=("no/out", "does not exist")
+    ),
+    "report into a file": bad_arguments(
+        "report", "scene.json", "-o", "scene.json", parts=("this is a file", "expected a folder")
+    ),
+    "report of no points": bad_arguments(
+        "report", "scene.json", "-o", "out", "--points", "0", parts=("--points", "from 1")
+    ),
+    "report of no size": bad_arguments(
+        "report", "scene.json", "-o", "out", "--size", "big", parts=("--size", "'big'")
+    ),
+    "report of never": bad_arguments(
+        "report", "scene.json", "-o", "out", "--repeats", "0", parts=("--repeats", "from 1")
+    ),
+    "report's technique": bad_arguments(
+        "report", "scene.json", "-o", "out", "--technique", "uniform:0", parts=('"0"', "4096")
+    ),
+    "report of two of one name": bad_arguments(
+        "report", "scene.json", "./scene.json", "-o", "out", parts=("named 'scene' too",)
+    ),
     "explain a technique": bad_arguments(
         "explain", "scene.json", "--technique", "q", parts=("'q'", "ltc")
     ),
@@ -622,7 +647,7 @@ def test_an_error_of_the_program_is_exit_code_1(
 
 
 @pytest.mark.parametrize("option", ["-h", "--help"])
-@pytest.mark.parametrize("command", ["shot", "probe", "bench", "explain"])
+@pytest.mark.parametrize("command", ["shot", "probe", "bench", "report", "explain"])
 def test_help_shows_an_example(command: str, option: str) -> None:
     result = CliRunner().invoke(app, [command, option])
     assert result.exit_code == 0
@@ -634,12 +659,12 @@ def test_help_shows_an_example(command: str, option: str) -> None:
 def test_help_of_the_program_names_every_command() -> None:
     result = CliRunner().invoke(app, ["--help"])
     assert result.exit_code == 0
-    for word in ("shot", "probe", "bench", "explain", "SCENE", "--version"):
+    for word in ("shot", "probe", "bench", "report", "explain", "SCENE", "--version"):
         assert word in result.stdout
     assert "window" not in re.sub("(?i)the window|a window", "", result.stdout)
 
 
-@pytest.mark.parametrize("command", ["shot", "probe", "bench", "explain"])
+@pytest.mark.parametrize("command", ["shot", "probe", "bench", "report", "explain"])
 def test_techniques_are_listed(command: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert run([command, "--technique", "help"]) == 0
     out, err = capfd.readouterr()
