@@ -289,6 +289,27 @@ def align(M: FloatArray) -> FloatArray:
     return turned
 
 
+def straighten(M: FloatArray, axis: int) -> FloatArray:
+    """Return M R without the entry of row ``axis`` (0 or 1) in the other of its first columns.
+
+    Parameters
+    ----------
+    M : (3, 3) float64
+        An aligned transform of a lobe that is symmetric about the plane across that axis.
+    axis : int
+        1 for views in the xz plane, 0 for views in the yz plane.
+
+    Notes
+    -----
+    Of such a lobe, Eq. 16 zeroes that entry. Where the alignment was off by a little, a plain
+    zero would change the lobe, and the sign of thin ones' determinants; the least
+    rotation to it does not.
+    """
+    other = 1 - axis
+    angle = np.arctan(M[axis, other] / M[axis, axis]) if M[axis, axis] != 0.0 else 0.5 * np.pi
+    return np.asarray(M @ _rotations(np.array([-angle if axis == 1 else angle]))[0])
+
+
 def _rotations(angle: FloatArray) -> FloatArray:
     R = np.zeros((angle.size, 3, 3))
     R[:, 0, 0] = R[:, 1, 1] = np.cos(angle)
@@ -339,6 +360,10 @@ def fit_entries(material: Material, seed: int, first: int, entries: FloatArray) 
         wo = np.array([s * np.cos(phi), s * np.sin(phi), np.cos(theta)])
         M, loss = fit_lobe(rejection_samples(lobe, wo, _SAMPLES, [seed, first + i]))
         M = align(M)
+        if phi == 0.0 or theta == 0.0:
+            M = straighten(M, 1)
+        elif phi == 0.5 * np.pi:
+            M = straighten(M, 0)
         result[i, :9] = (M / np.linalg.norm(M[:, 2])).ravel()
         result[i, 9] = loss
         result[i, 10:] = albedo(lobe, wo)
@@ -391,7 +416,8 @@ def fit_published(
     Parameters
     ----------
     output : str or Path
-        The ``.npy`` file of the matrices, float32. Amplitude and Fresnel part go to files
+        The ``.npy`` file of the matrices, in float64, because in float32 the thinnest lobes
+        at grazing views would be singular. Amplitude and Fresnel part go to files
         beside it, ``NAME_albedo.npy`` and ``NAME_fresnel.npy``; ``python -m ltc check`` takes
         the three. A checkpoint lies beside them until the end.
     shape : four ints, 2 to 64
@@ -441,8 +467,7 @@ def fit_published(
         published_files(output), (table.matrices, table.albedo, table.fresnel), strict=True
     ):
         buffer = io.BytesIO()
-        with np.errstate(under="ignore"):
-            np.save(buffer, array.astype(np.float32))
+        np.save(buffer, array)
         write_atomically(path, buffer.getvalue())
     work.path.unlink(missing_ok=True)
     return table
