@@ -17,6 +17,15 @@ steps of expectation maximisation on the samples, about their mean direction, st
 every lobe close, whatever the BRDF.
 
 A BRDF is what can be evaluated and sampled, see `Brdf`; `ggx` is one.
+
+Measured on the default, 8^4 entries: 200 s on two idle cores, 460 s on two with other work;
+60 to 150 ms an entry. Distance: mean .0119, median .0091, largest .059 (a lune), of which sampling
+noise is a part: on 60 random entries and 2,048 fresh samples .0103, against .0091 for
+fits to four times the samples until nothing is gained, and .0031 between two sets
+of samples of the same lobe. Shading error as in `ltc.anisotropic_fit`: mean .011, p99 .16; total
+variation .151, nearly twice the default fit's, as published (.149): the distance
+hardly sees the minor axis of a thin lobe, and matrices of thin lobes do not interpolate
+along a uniform alpha axis.
 """
 
 from __future__ import annotations
