@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -157,7 +158,10 @@ folder = sys.argv[1]
 adapters = wgpu.gpu.enumerate_adapters_sync()
 if not adapters:
     sys.exit(77)
-device = adapters[0].request_device_sync()
+try:
+    device = adapters[0].request_device_sync()
+except RuntimeError:  # an adapter whose driver cannot do what WebGPU asks
+    sys.exit(77)
 data = np.load(folder + "/data.npz")
 names = json.loads(str(data["names"]))
 code = open(folder + "/code.wgsl").read()
@@ -219,15 +223,18 @@ def test_wgsl(kind: str, tmp_path: Path) -> None:
     main = WGSL_MAIN.format(bindings=bindings, call=CALLS[kind])
     (tmp_path / "code.wgsl").write_text(snippet(table(kind), "wgsl") + main)
     np.savez(tmp_path / "data.npz", names=json.dumps(list(flat)), inputs=rows, count=COUNT, **flat)
+    # Limits on OpenGL's version are not WebGPU's business.
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("MESA_GL")}
     done = subprocess.run(
         [sys.executable, "-c", WGSL_RUNNER, str(tmp_path)],
+        env=environment,
         capture_output=True,
         text=True,
         timeout=120,
         check=False,
     )
     if done.returncode == 77:
-        pytest.skip("no adapter for WebGPU here")
+        pytest.skip("no device for WebGPU here")
     assert done.returncode == 0, done.stderr
     out = np.load(tmp_path / "out.npy").reshape(COUNT, 3, 4).astype(np.float64)
     compare(kind, inputs, out[:, :, :3], out[:, :, 3])
