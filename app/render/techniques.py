@@ -63,7 +63,7 @@ class Technique:
 
 TECHNIQUES: dict[str, Technique] = {
     "ltc": Technique(
-        "linearly transformed cosines: exact polygon integrals of a fitted GGX lobe, Lambert "
+        "linearly transformed cosines: a fitted GGX lobe integrated along the outline, Lambert "
         "diffuse",
         anisotropic=False,
         has_tables=True,
