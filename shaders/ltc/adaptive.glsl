@@ -19,14 +19,14 @@ vec3 point_at(CosineLight light, vec2 p)
 float chord_angle(CosineLight light, PowerCurve curve, float from, float to)
 {
     vec2 a = curve_point(curve, from);
+    vec2 b = curve_point(curve, to);
     vec2 d = (to - from) * (curve.c1 + (from + to) * curve.c2 +
                             (from * from + from * to + to * to) * curve.c3);
-    vec3 w = d.x * light.center_cross_u + d.y * light.center_cross_v +
-             cross_2d(a, d) * light.u_cross_v;
+    vec3 w = edge_plane(light, PlanarEdge(a, b, d, cross_2d(a, d)));
     count_evaluations(1);
     float w2 = dot(w, w);
     float inverse = w2 < 1e-36 ? 0.0 : inversesqrt(w2);
-    float cosine = dot(point_at(light, a), point_at(light, curve_point(curve, to)));
+    float cosine = dot(point_at(light, a), point_at(light, b));
     return w.z * inverse * positive_atan2(w2 * inverse, cosine);
 }
 
