@@ -1,4 +1,7 @@
-"""Paths in files, and writing in one step: the old or the whole new file is there, never half."""
+"""Paths in files, reading what is not too large, and writing in one step.
+
+After writing the old or the whole new file is there, never half.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.errors import InputError, expected_one_of, os_reason
+from app.errors import InputError, expected_one_of, os_reason, require_file
 
 
 def check_output(path: Path, kind: str, suffixes: Sequence[str] = ()) -> None:
@@ -87,3 +90,30 @@ def relative_path(path: str, base: Path | None) -> str:
         return Path(os.path.relpath(absolute_path(path), base.resolve())).as_posix()
     except ValueError:  # another drive
         return absolute_path(path)
+
+
+def read_file(path: Path, kind: str, suffix: str, most_bytes: int) -> bytes:
+    """Return what is in a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind, suffix : str
+        What it shall be, such as "a scene file" and ".json", for messages.
+    most_bytes : int
+        A larger file is not read.
+
+    Raises
+    ------
+    InputError
+        If it is missing, not a file, too large or cannot be read.
+    """
+    require_file(path, f"{kind} ({suffix})")
+    try:
+        size = path.stat().st_size
+        if size > most_bytes:
+            raise InputError(f"{path}: the file has {size} bytes, expected at most {most_bytes}")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({os_reason(error)}), expected {kind}") from error

@@ -16,8 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.errors import InputError, describe, expected_one_of, nearest, os_reason, require_file
-from app.files import absolute_path, relative_path, replace_file
+from app.errors import InputError, describe, expected_one_of, nearest
+from app.files import absolute_path, read_file, relative_path, replace_file
 from app.json_reader import (
     JsonObject,
     PlaceError,
@@ -124,16 +124,7 @@ def demo_scenes() -> dict[str, Path]:
 
 
 def _read_text(path: Path) -> str:
-    require_file(path, "a scene file (.json)")
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise InputError(f"{path}: the file has {size} bytes, expected at most {LARGEST_FILE}")
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({os_reason(error)}), expected a scene file"
-        ) from error
+    data = read_file(path, "a scene file", ".json", LARGEST_FILE)
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError(f"{path}: the file is in UTF-16, expected UTF-8")
     try:

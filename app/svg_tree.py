@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
-from app.errors import InputError, os_reason, require_file
+from app.errors import InputError
+from app.files import read_file
 
 LARGEST_FILE = 32 * 2**20
 """Bytes of an SVG file."""
@@ -125,16 +126,7 @@ def read_tree(path: Path) -> Node:
 
 
 def _read(path: Path) -> bytes:
-    require_file(path, "an SVG file (.svg)")
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise InputError(f"{path}: the file has {size} bytes, expected at most {LARGEST_FILE}")
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({os_reason(error)}), expected an SVG file"
-        ) from None
+    data = read_file(path, "an SVG file", ".svg", LARGEST_FILE)
     if not data.strip():
         raise InputError(f"{path}: the file is empty, expected <svg>")
     return data
