@@ -27,7 +27,8 @@ from app.gui.messages import Messages
 from app.gui.outline_tool import OutlineTool, Spot
 from app.gui.overlays import Canvas, Sight, View, help_line
 from app.gui.placement import box_corners, moved_by, name_of, pose_of, sphere_around
-from app.render.renderer import Hit, Renderer
+from app.render.picking import Hit
+from app.render.renderer import Renderer
 from app.scene import Camera, RenderSettings, Scene, SceneError, Shot, Vec2
 from app.vectors import add, length, subtract
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -22,6 +22,7 @@ from app.render.features import LightNeeds, Limits
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
 from app.render.pack import CurveForm
+from app.render.picking import Hit, Picker, direction_from_octahedral, facing_normal
 from app.render.plan import ATTACHMENTS, FORMAT_BYTES, Needs, Plan, make_plan, needs_of
 from app.render.post import DisplayPass
 from app.render.programs import Programs
@@ -30,15 +31,6 @@ from app.render.state import begin_pass, release_framebuffer
 from app.render.techniques import find_technique, suited_technique, technique_of
 from app.render.timers import PassTimers
 from app.scene import Display, PixelView, RenderSettings, Scene, Shot
-
-
-@dataclass(frozen=True)
-class Hit:
-    """What a pixel shows: ``index`` counts the scene's objects or lights."""
-
-    kind: Literal["object", "light"]
-    index: int
-    position_ws: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +171,7 @@ class Renderer:
         self._lighting = LightingPass(ctx, self.programs)
         self._display = DisplayPass(ctx, self.programs)
         self._targets = _Targets(ctx)
-        self._pick_target: moderngl.Framebuffer | None = None
+        self._picker = Picker(ctx)
         self._timers = PassTimers(ctx)
         self._cpu_ms = 0.0
         self._held: Scene | None = None
@@ -297,33 +289,9 @@ class Renderer:
         shot = self._seen.shot
         if not (0.0 <= x < shot.width and 0.0 <= y < shot.height):
             return None
-        if self._pick_target is None:
-            self._pick_target = self.ctx.framebuffer(
-                color_attachments=[self.ctx.texture((1, 1), 4, dtype="f4")],
-                depth_attachment=self.ctx.depth_renderbuffer((1, 1)),
-            )
-        size = (shot.width, shot.height)
-        frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
-        ndc = (2.0 * x / shot.width - 1.0, 1.0 - 2.0 * y / shot.height)
-        window = (
-            float(shot.width),
-            float(shot.height),
-            -ndc[0] * shot.width,
-            -ndc[1] * shot.height,
-        )
         self._hold_geometry(shot.scene, self._gbuffer.has_tangents)
-        self._gbuffer.draw(self._pick_target, frame, window)
-        surface = np.frombuffer(
-            self._pick_target.read(components=4, dtype="f4"), dtype=np.float32
-        ).astype(np.float64)
-        depth, identity = surface[2], int(surface[3])
-        if depth <= 0.0:
-            return None
-        position = frame.eye + depth * frame.ray(x, y, size)
-        place = (float(position[0]), float(position[1]), float(position[2]))
-        if identity >= 0:
-            return Hit("object", identity, place)
-        return Hit("light", -1 - identity, place)
+        frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
+        return self._picker.pick(self._gbuffer, frame, (shot.width, shot.height), x, y)
 
     def surfaces(self) -> Surfaces:
         """Return the surface points of the sample rendered last, if that was a pixel's centre.
@@ -493,13 +461,7 @@ class Renderer:
         self._display.release()
         self._timers.release()
         self.programs.release()
-        if self._pick_target is not None:
-            color, depth = self._pick_target.color_attachments, self._pick_target.depth_attachment
-            release_framebuffer(self._pick_target)
-            for attachment in (*color, depth):
-                if attachment is not None:
-                    attachment.release()
-            self._pick_target = None
+        self._picker.release()
 
     # Within
 
@@ -640,21 +602,6 @@ class Renderer:
         if self._seen is None or not self._newest:
             raise RuntimeError("nothing was rendered yet")
         return self._targets.texture(self._newest)
-
-
-def direction_from_octahedral(p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the unit vectors (n, 3) of (n, 2), as ``shaders/common/octahedron.glsl``."""
-    z = 1.0 - np.abs(p).sum(axis=-1)
-    folded = (1.0 - np.abs(p[:, ::-1])) * np.where(p < 0.0, -1.0, 1.0)
-    v = np.column_stack([np.where(z[:, None] < 0.0, folded, p), z])
-    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
-
-
-def facing_normal(normal: NDArray[np.float64], wo: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return normals as ``shaders/passes/lighting.frag`` bends them to face the viewer."""
-    missing = np.maximum(1e-4 - np.sum(normal * wo, axis=-1, keepdims=True), 0.0)
-    bent = normal + missing * wo
-    return np.asarray(bent / np.linalg.norm(bent, axis=-1, keepdims=True))
 
 
 def _top_down(texture: moderngl.Texture, dtype: DTypeLike) -> NDArray[Any]:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from app.meshes import load_mesh
 from app.render.camera import FAR, NEAR, CameraFrame, world_from_object
-from app.render.renderer import Hit, Renderer
+from app.render.picking import Hit
+from app.render.renderer import Renderer
 from app.scene import (
     AreaLight,
     Camera,
@@ -240,12 +241,16 @@ def test_pick(renderer: Renderer) -> None:
     direction = frame.ray(20.25, 80.75, SIZE)
     expected = frame.eye - direction * frame.eye[1] / direction[1]
     np.testing.assert_allclose(ground.position_ws, expected, atol=1e-5)
+    np.testing.assert_allclose(ground.normal_ws, (0.0, 1.0, 0.0), atol=1e-6)
+    assert ground.tangent_ws is None
 
     sphere = renderer.pick(107.0, 52.0)
     assert isinstance(sphere, Hit)
     assert (sphere.kind, sphere.index) == ("object", 1)
     distance = math.dist(sphere.position_ws, ball().transform.translate)
     assert distance == pytest.approx(0.5, rel=2e-3)
+    outward = np.subtract(sphere.position_ws, ball().transform.translate) / distance
+    assert np.dot(outward, sphere.normal_ws) > 0.999  # a mesh of facets
 
     assert renderer.pick(3.0, 3.0) is None
     for outside in ((-1.0, 5.0), (160.0, 5.0), (5.0, 90.0)):
@@ -257,6 +262,22 @@ def test_pick_without_lights(renderer: Renderer) -> None:
     hit = renderer.pick(80.0, 80.0)
     assert hit is not None
     assert hit.kind == "object"
+
+
+def test_pick_of_brushed_metal(renderer: Renderer) -> None:
+    """The tangent is the mesh's, in world space: the x axis of a plane that is turned and tilted."""
+    half = math.radians(15.0)
+    turn = (math.cos(half), 0.6 * math.sin(half), 0.0, 0.8 * math.sin(half))
+    metal = replace(GLOSSY, alpha=(0.4, 0.05))
+    plane = SceneObject("plate", "plane", GLOSSY.name, Transform((0.0, 0.0, 0.0), turn, (5.0,) * 3))
+    scene = Scene((metal,), (plane,), (KEY,))
+    renderer.render(Shot(scene, RenderSettings("ggx"), *SIZE))
+    hit = renderer.pick(80.0, 70.0)
+    assert hit is not None
+    assert hit.tangent_ws is not None
+    matrix = world_from_object(plane.transform)[:3, :3] / 5.0
+    np.testing.assert_allclose(hit.tangent_ws, matrix[:, 0], atol=1e-6)
+    np.testing.assert_allclose(hit.normal_ws, matrix[:, 1], atol=1e-6)
 
 
 def test_octahedral_round_trip(ctx: moderngl.Context, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.outline import boundary
 from app.presets import disk, ring
-from app.render.renderer import direction_from_octahedral, facing_normal
+from app.render.picking import direction_from_octahedral, facing_normal
 from app.render.tables import isotropic_textures
 from app.render.truth import exact_radiance, shading_frames
 from app.scene import (

@@ -1,0 +1,109 @@
+"""What a picture shows at one point: the G-buffer pass over a single pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from app.render.camera import CameraFrame
+from app.render.gbuffer import GBufferPass
+from app.render.state import release_framebuffer
+from app.scene import Vec3
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hit:
+    """What a pixel shows: ``index`` counts the scene's objects or lights.
+
+    Attributes
+    ----------
+    position_ws : world space [m]
+    normal_ws : unit, bent to face the viewer as the lighting pass does
+    tangent_ws : the mesh's tangent, not perpendicular to the normal, zero at its poles; None
+        where the shot needs no tangents
+    """
+
+    kind: Literal["object", "light"]
+    index: int
+    position_ws: Vec3
+    normal_ws: Vec3
+    tangent_ws: Vec3 | None = None
+
+
+class Picker:
+    """Owner of a target of one pixel, made when it is first asked something."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._target: moderngl.Framebuffer | None = None
+
+    def pick(
+        self, gbuffer: GBufferPass, frame: CameraFrame, size: tuple[int, int], x: float, y: float
+    ) -> Hit | None:
+        """Return what ``gbuffer`` holds at pixel coordinates from the top left, or None."""
+        if self._target is None:
+            kinds = (4, 2)  # as `app.render.gbuffer` has them
+            self._target = self._ctx.framebuffer(
+                color_attachments=[self._ctx.texture((1, 1), n, dtype="f4") for n in kinds],
+                depth_attachment=self._ctx.depth_renderbuffer((1, 1)),
+            )
+        width, height = size
+        ndc = (2.0 * x / width - 1.0, 1.0 - 2.0 * y / height)
+        window = (float(width), float(height), -ndc[0] * width, -ndc[1] * height)
+        gbuffer.draw(self._target, frame, window)
+        surface = self._read(0, 4)
+        depth, identity = float(surface[2]), int(surface[3])
+        if depth <= 0.0:
+            return None
+        ray = frame.ray(x, y, size)
+        wo = -ray / np.linalg.norm(ray)
+        normal = facing_normal(direction_from_octahedral(surface[None, :2]), wo[None])[0]
+        position = _vec3(frame.eye + depth * ray)
+        if identity < 0:
+            return Hit("light", -1 - identity, position, _vec3(normal))
+        tangent = None
+        if gbuffer.has_tangents:
+            tangent = _vec3(direction_from_octahedral(self._read(1, 2)[None])[0])
+        return Hit("object", identity, position, _vec3(normal), tangent)
+
+    def _read(self, attachment: int, components: int) -> FloatArray:
+        assert self._target is not None
+        raw = self._target.read(components=components, attachment=attachment, dtype="f4")
+        return np.frombuffer(raw, dtype=np.float32).astype(np.float64)
+
+    def release(self) -> None:
+        """Release every GPU object."""
+        if self._target is None:
+            return
+        attachments = (*self._target.color_attachments, self._target.depth_attachment)
+        release_framebuffer(self._target)
+        for attachment in attachments:
+            if attachment is not None:
+                attachment.release()
+        self._target = None
+
+
+def direction_from_octahedral(p: FloatArray) -> FloatArray:
+    """Return the unit vectors (n, 3) of (n, 2), as ``shaders/common/octahedron.glsl``."""
+    z = 1.0 - np.abs(p).sum(axis=-1)
+    folded = (1.0 - np.abs(p[:, ::-1])) * np.where(p < 0.0, -1.0, 1.0)
+    v = np.column_stack([np.where(z[:, None] < 0.0, folded, p), z])
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+
+
+def facing_normal(normal: FloatArray, wo: FloatArray) -> FloatArray:
+    """Return normals as ``shaders/passes/lighting.frag`` bends them to face the viewer."""
+    missing = np.maximum(1e-4 - np.sum(normal * wo, axis=-1, keepdims=True), 0.0)
+    bent = normal + missing * wo
+    return np.asarray(bent / np.linalg.norm(bent, axis=-1, keepdims=True))
+
+
+def _vec3(values: FloatArray) -> Vec3:
+    x, y, z = values.tolist()
+    return (x, y, z)
