@@ -8,16 +8,11 @@ what it was measured with; where that is not what is asked for now, it is measur
 from __future__ import annotations
 
 import base64
-import csv
 import hashlib
 import io
 import json
-import os
-import platform
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,7 +22,6 @@ from numpy.typing import NDArray
 
 from app.cli.common import (
     SizeOption,
-    Steps,
     TechniquesOption,
     headless_renderer,
     image_size,
@@ -37,6 +31,7 @@ from app.cli.common import (
     scene_path,
     whole_number,
 )
+from app.cli.folder import TimedSteps, check_folder, csv_text, machine_facts, version
 from app.cli.log_plot import pareto_front
 from app.cli.measure import Exact, mean_evaluations, measure_passes
 from app.cli.report_page import Pictures, Row, report_page
@@ -150,7 +145,7 @@ def report(
     for technique in techniques:
         suited_technique(technique, anisotropic=False)
     loaded = _load(scenes or list(demo_scenes()))
-    _check_folder(output)
+    check_folder(output, "the report")
     measured: dict[Path, dict[str, Any]] = {}
     with headless_renderer() as (ctx, renderer):
         device = str(ctx.info["GL_RENDERER"])
@@ -158,7 +153,7 @@ def report(
             renderer.use_wall_clock()
         origin = {
             "renderer": device,
-            "program": _version("ltc-viewer"),
+            "program": version("ltc-viewer"),
             "size": [width, height],
             "points": points,
             "repeats": repeats,
@@ -182,7 +177,7 @@ def report(
         missing = [job for job in jobs if job.part not in measured]
         if len(missing) < len(jobs):
             messages().print(f"{len(jobs) - len(missing)} of {len(jobs)} parts are there already.")
-        machine = _machine(ctx)
+        machine = machine_facts(ctx)
         _measure_all(ctx, renderer, missing, measured)
     rows = _rows(jobs, measured)
     settings = {
@@ -205,7 +200,7 @@ def report(
     )
     for name, text in (
         ("results.json", json.dumps(figures, indent=2, allow_nan=False) + "\n"),
-        ("results.csv", _csv(rows)),
+        ("results.csv", csv_text(rows)),
         ("index.html", page),
     ):
         replace_file(output / name, text.encode("utf-8"), "a report")
@@ -225,16 +220,6 @@ def _load(names: Sequence[str]) -> dict[str, tuple[Scene, str]]:
             )
         found[path.stem] = scene, hashlib.sha256(path.read_bytes()).hexdigest()
     return found
-
-
-def _check_folder(path: Path) -> None:
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{path}: this is a file, expected a folder for the report")
-    parent = path if path.exists() else path.parent
-    if not parent.is_dir():
-        raise InputError(f"{path}: the folder {parent} does not exist, expected one that does")
-    if not os.access(parent, os.W_OK):
-        raise InputError(f"{path}: permission denied, expected a writable place for the report")
 
 
 def _techniques_of(scene: Scene, wanted: Sequence[str]) -> list[str]:
@@ -272,10 +257,7 @@ def _measure_all(
     measured: dict[Path, dict[str, Any]],
 ) -> None:
     """Measure jobs, write a part for each, and add it to ``measured``."""
-    start = time.monotonic()
-    told = start
-    is_terminal = messages().is_terminal
-    with Steps("measuring", len(jobs)) as steps:
+    with TimedSteps("measuring", "measured", len(jobs)) as steps:
         comparison: _Comparison | None = None
         for index, job in enumerate(jobs, start=1):
             if comparison is None or comparison.scene is not job.scene:
@@ -290,15 +272,6 @@ def _measure_all(
             # As read again, so that a resumed report has the very same figures.
             measured[job.part] = json.loads(text)
             steps.done(index)
-            now = time.monotonic()
-            if not is_terminal and now - told > 10.0:
-                told = now
-                left = (now - start) / index * (len(jobs) - index)
-                messages().print(f"{index} of {len(jobs)} measured, about {_span(left)} left")
-
-
-def _span(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
 
 
 class _Comparison:
@@ -417,31 +390,3 @@ def _rows(jobs: Sequence[Job], measured: dict[Path, dict[str, Any]]) -> list[Row
             for row in some:
                 row[f"on_front_{lobe}"] = int(id(row) in on_front)
     return rows
-
-
-def _csv(rows: Sequence[Row]) -> str:
-    """Return rows as CSV; a number is written as in JSON, none as nothing."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
-
-
-def _machine(ctx: moderngl.Context) -> dict[str, str]:
-    versions = {f"{name} version": _version(name) for name in ("ltc-viewer", "numpy", "scipy")}
-    return {
-        "renderer": str(ctx.info["GL_RENDERER"]),
-        "gl_version": str(ctx.info["GL_VERSION"]),
-        "platform": platform.platform(),
-        "processors": str(os.cpu_count()),
-        "python": platform.python_version(),
-        **versions,
-    }
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "not installed"

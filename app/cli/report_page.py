@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
+from app.cli.html_page import facts_table, html_page, sortable_table
 from app.cli.log_plot import Point, log_plot
 from app.render.plan import format_bytes
 
@@ -40,41 +41,6 @@ COLUMNS = (
     ("max", "diffuse_max"),
 )
 """Heading and key of the tables' columns; ``results.csv`` has more."""
-
-STYLE = """
-:root { color-scheme: light dark; }
-body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 1200px;
-  padding: 0 1rem; background: #fff; color: #1b1f24; }
-h2 { margin-top: 3rem; border-top: 1px solid #8886; padding-top: 1rem; }
-svg { max-width: 100%; height: auto; }
-.side { display: flex; flex-wrap: wrap; gap: 1rem; }
-figure { margin: 0; }
-figcaption { font-size: 13px; }
-figure img { display: block; image-rendering: pixelated; max-width: 100%; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
-th, td { padding: .2rem .6rem; text-align: right; border-bottom: 1px solid #8884;
-  white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; }
-table.sortable th { cursor: pointer; white-space: normal; vertical-align: bottom; }
-th[aria-sort=ascending]::after { content: " \\2191"; }
-th[aria-sort=descending]::after { content: " \\2193"; }
-tr.front td:first-child { font-weight: bold; }
-@media (prefers-color-scheme: dark) { body { background: #14171a; color: #e4e7ea; } }
-"""
-
-SCRIPT = """
-for (const head of document.querySelectorAll("table.sortable th"))
-  head.onclick = () => {
-    const table = head.closest("table"), body = table.tBodies[0], column = head.cellIndex;
-    const up = head.getAttribute("aria-sort") !== "ascending";
-    for (const other of head.parentNode.cells) other.removeAttribute("aria-sort");
-    head.setAttribute("aria-sort", up ? "ascending" : "descending");
-    const key = row => row.cells[column].dataset.value ?? row.cells[column].textContent;
-    const order = (a, b) => column ? key(a) - key(b) : key(a).localeCompare(key(b), "en");
-    body.append(...[...body.rows].sort((a, b) => up ? order(a, b) : order(b, a)));
-  };
-"""
 
 
 @dataclass(frozen=True)
@@ -127,7 +93,7 @@ def report_page(
         + " A pixel's <em>evaluations</em> of the integral along the outlines depend on no "
         "machine, but one of another technique is other work. All numbers are in "
         "<code>results.csv</code> and <code>results.json</code>.</p>",
-        _facts({**machine, **{name: str(value) for name, value in settings.items()}}),
+        facts_table({**machine, **{name: str(value) for name, value in settings.items()}}),
     ]
     if len(scenes) > 1:
         body += ["<h2>All scenes</h2>", '<div class="side">', _plot_all(rows), "</div>", _legend()]
@@ -150,13 +116,7 @@ def report_page(
                 f"<figcaption>{name}, difference</figcaption></figure>"
             )
         body.append("</div>")
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width">\n'
-        f"<title>Error against run time</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
-        + "\n".join(body)
-        + f"\n<script>{SCRIPT}</script>\n</body>\n</html>\n"
-    )
+    return html_page("Error against run time", body)
 
 
 def _colour(technique: str) -> str:
@@ -208,29 +168,15 @@ def _legend(rows: Sequence[Row] = ()) -> str:
     return f"<p>{keys}</p>"
 
 
-def _facts(facts: dict[str, str]) -> str:
-    lines = "".join(
-        f'<tr><td>{escape(name)}</td><td style="text-align:left;white-space:normal">'
-        f"{escape(value)}</td></tr>"
-        for name, value in facts.items()
-    )
-    summary = "<summary>Machine, versions and settings</summary>"
-    return f"<details>{summary}<table>{lines}</table></details>"
-
-
 def _table(rows: Sequence[Row]) -> str:
-    heads = "".join(f'<th scope="col">{escape(head)}</th>' for head, _ in COLUMNS)
     lines = []
     for row in rows:
         cells = "".join(_cell(key, row.get(key)) for _, key in COLUMNS)
         lines.append(
             f'<tr class="front">{cells}</tr>' if row["on_front_ggx"] else f"<tr>{cells}</tr>"
         )
-    return (
-        f'<div class="wide"><table class="sortable"><thead><tr>{heads}</tr></thead>'
-        f"<tbody>{''.join(lines)}</tbody></table></div>"
-        "<p>Click a heading to sort; bold techniques are on the front.</p>"
-    )
+    table = sortable_table([head for head, _ in COLUMNS], lines)
+    return f"{table}<p>Click a heading to sort; bold techniques are on the front.</p>"
 
 
 def _cell(key: str, value: Any) -> str:
