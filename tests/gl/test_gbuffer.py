@@ -265,7 +265,7 @@ def test_pick_without_lights(renderer: Renderer) -> None:
 
 
 def test_pick_of_brushed_metal(renderer: Renderer) -> None:
-    """The tangent is the mesh's, in world space: the x axis of a plane that is turned and tilted."""
+    """The tangent is the mesh's, in world space: the x axis of a plane turned and tilted."""
     half = math.radians(15.0)
     turn = (math.cos(half), 0.6 * math.sin(half), 0.0, 0.8 * math.sin(half))
     metal = replace(GLOSSY, alpha=(0.4, 0.05))
