@@ -391,17 +391,24 @@ class RenderSettings:
 
     One sample is exactly the pixel centre. ``view`` is what a pixel shows: its radiance, or its
     cost, the number of evaluations of the contour integral that its lights took.
+
+    ``positions`` is how many places in a pixel the samples take in turn, 0 for one of its own
+    each: pictures of different techniques with unequal numbers of samples differ by nothing but
+    the technique if they share it, and their samples are multiples of it.
     """
 
     technique: str = "auto"
     samples: int = 1
     view: PixelView = "radiance"
+    positions: int = 0
 
     def __post_init__(self) -> None:
         if self.view not in PIXEL_VIEWS:
             raise SceneError(f"view is '{self.view}', expected one of {', '.join(PIXEL_VIEWS)}")
         if not 1 <= self.samples <= MAX_SAMPLES:
             raise SceneError(f"samples is {self.samples}, expected between 1 and {MAX_SAMPLES}")
+        if not 0 <= self.positions <= MAX_SAMPLES:
+            raise SceneError(f"positions is {self.positions}, expected between 0 and {MAX_SAMPLES}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,12 +21,13 @@ from app import edits, lights, planes
 from app.editor import NOTHING, Editor, Selection
 from app.errors import InputError
 from app.gui import theme
-from app.gui.cost_legend import cost_legend
+from app.gui.legend import draw_legend
 from app.gui.live_picture import LivePicture
 from app.gui.messages import Messages
 from app.gui.outline_tool import OutlineTool, Spot
 from app.gui.overlays import Canvas, Sight, View, help_line
 from app.gui.placement import box_corners, moved_by, name_of, pose_of, sphere_around
+from app.render import cost
 from app.render.picking import Hit
 from app.render.renderer import Renderer
 from app.scene import Camera, RenderSettings, Scene, SceneError, Shot, Vec2
@@ -129,7 +130,7 @@ class Viewport:
         self.picture.render(scene, self.camera_of(scene), self.settings, self.view.pixels)
         self.picture.draw(self.view)
         if self.settings.view == "cost":
-            cost_legend(self.view)
+            draw_legend(self.view, cost.LEGEND)
         self._is_asking = False
         if self.show_overlays:
             self._overlays(editor)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from app.render.cost import EMPTY, NONE, OCTAVES, VIRIDIS
+from app.render.colour_maps import VIRIDIS, ColourMap
+from app.render.cost import EMPTY, NONE, OCTAVES
 from app.render.programs import Programs, ProgramSpec, set_uniform
 from app.render.state import FullScreenTriangle, begin_pass
 from app.scene import TONE_MAPS, Display, PixelView
@@ -19,8 +20,14 @@ def display_spec(display: Display, view: PixelView = "radiance") -> ProgramSpec:
         for name in TONE_MAPS
     }
     features["SHOWS_COST"] = int(shows_cost)
-    features["COST_COLORS"] = len(VIRIDIS) if shows_cost else 0
+    features["MAP_COLORS"] = len(VIRIDIS) if shows_cost else 0
     return ProgramSpec.of("display", "passes/fullscreen.vert", "passes/display.frag", features)
+
+
+def set_map(program: moderngl.Program, colours: ColourMap) -> None:
+    """Set the colours of ``shaders/common/color_map.glsl``."""
+    values = [tuple(float(c) for c in row) for row in np.array(colours) / 255.0]
+    set_uniform(program, "map_colors", values)
 
 
 class DisplayPass:
@@ -44,8 +51,7 @@ class DisplayPass:
         radiance.use(0)
         set_uniform(program, "exposure_scale", 2.0**display.exposure)
         if view == "cost":
-            colours = [tuple(float(c) for c in row) for row in np.array(VIRIDIS) / 255.0]
-            set_uniform(program, "cost_colors", colours)
+            set_map(program, VIRIDIS)
             set_uniform(program, "cost_octaves", float(OCTAVES))
             set_uniform(program, "cost_none", tuple(c / 255.0 for c in NONE))
             set_uniform(program, "cost_empty", tuple(c / 255.0 for c in EMPTY))

@@ -63,6 +63,7 @@ class _Seen:
             (mine.width, mine.height) == (other.width, other.height)
             and mine.settings.technique == other.settings.technique
             and mine.settings.view == other.settings.view
+            and mine.settings.positions == other.settings.positions
             and all(
                 getattr(a, part) is getattr(b, part) or getattr(a, part) == getattr(b, part)
                 for part in ("camera", "materials", "objects", "lights")
@@ -538,7 +539,8 @@ class Renderer:
         target = self._targets.framebuffer(newest)
         if needs.lighting.lit:
             frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
-            offset = pixel_offset(self._samples)
+            positions = shot.settings.positions
+            offset = pixel_offset(self._samples % positions if positions else self._samples)
             window = (1.0, 1.0, -2.0 * offset[0] / shot.width, -2.0 * offset[1] / shot.height)
             names = ("gbuffer", "tangents") if needs.lighting.tangents else ("gbuffer",)
             surfaces = self._targets.framebuffer(*names, depth=True)

@@ -11,7 +11,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from app.context import headless_context
-from app.render.cost import draw_legend
+from app.render.colour_maps import draw_legend
+from app.render.cost import LEGEND
 from app.render.renderer import Renderer
 from app.scene import RenderSettings, Shot
 from app.scene_io import load_scene
@@ -45,7 +46,7 @@ def main() -> None:
                 print(f"{name} {technique}: mean {mean:.0f}, most {counts.max():.0f}")
                 colours = renderer.display()
                 if (row, column) == (len(SCENES) - 1, 0):
-                    colours = draw_legend(colours)
+                    colours = draw_legend(colours, LEGEND)
                 picture = _labelled(Image.fromarray(np.ascontiguousarray(colours)),
                                     f"{technique}: {mean:.0f} on average")  # fmt: skip
                 sheet.paste(picture, (column * (width + GAP), row * (height + GAP)))

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from app.presets import heart, ring
+from app.render.colour_maps import VIRIDIS, draw_legend
 from app.render.cost import (
     EMPTY,
+    LEGEND,
     NONE,
     OCTAVES,
     TICKS,
-    VIRIDIS,
     WithLegend,
     colour_of,
-    draw_legend,
 )
 from app.scene import (
     AreaLight,
@@ -143,7 +143,7 @@ def test_scale():
 
 def test_legend():
     grey = np.full((200, 400, 3), 89, np.uint8)
-    drawn = draw_legend(grey)
+    drawn = draw_legend(grey, LEGEND)
     assert drawn.shape == grey.shape
     assert np.all(grey == 89)
     changed = np.any(drawn != grey, axis=-1)
@@ -154,7 +154,7 @@ def test_legend():
     for colour in (VIRIDIS[0], VIRIDIS[-1]):
         assert np.any(np.all(bar == colour, axis=-1))
     tiny = np.zeros((8, 8, 3), np.uint8)
-    np.testing.assert_array_equal(draw_legend(tiny), tiny)
+    np.testing.assert_array_equal(draw_legend(tiny, LEGEND), tiny)
 
 
 def test_files_get_colours_with_a_legend_or_counts(renderer):

@@ -24,7 +24,7 @@ from imgui_bundle import imgui
 from app import edits, lights, planes
 from app.editor import NOTHING, Selection
 from app.panels.export import Export
-from app.render.cost import VIRIDIS
+from app.render.colour_maps import VIRIDIS
 from app.scene import (
     AreaLight,
     Camera,
