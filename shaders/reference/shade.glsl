@@ -11,7 +11,7 @@
 
 #include "common/light_data.glsl"
 #include "common/material.glsl"
-#include "common/random.glsl"
+#include "common/sequence.glsl"
 #include "common/tangent_frame.glsl"
 #include "ltc/plane_view.glsl"
 #include "reference/inside.glsl"
@@ -26,11 +26,17 @@ struct Estimate {
     bool matt;               // whether they are drawn by the cosine
     vec3 glossy_way;         // tangent frame
     vec3 matt_way;
-    vec2 on_light;           // random place in a light's rectangle
+    float across;            // random height in a light's rectangle
     float total_importance;
     float passed;            // importance of the lights so far
-    float pick;              // the light that takes `passed` beyond this is chosen
+    float pick;              // the light that takes `passed` beyond this is chosen, and the
+                             // place along its rectangle is where in its part this lies
 };
+
+// What the points of a pixel's sequence are for.
+const uint GLOSSY_WAY = 0u;
+const uint MATT_WAY = 1u;
+const uint LIGHT_PLACE = 2u;
 
 // With which probability a light is chosen, up to a factor; 0 only where it sends nothing.
 float light_importance(PlanarLight light, PlaneView view, vec3 normal)
@@ -47,8 +53,7 @@ Estimate begin_estimate(
     uvec3 seed, int light_count, vec3 position, vec3 normal, vec3 tangent, vec3 wo, vec2 alpha,
     bool has_lobe, bool has_diffuse)
 {
-    vec4 ways = random_numbers(seed, 0u);
-    vec4 light = random_numbers(seed, 1u);
+    vec2 light = sequence_point(seed, LIGHT_PLACE);
     Estimate estimate;
     estimate.position = position;
     estimate.world_from_tangent = tangent_frame(normal, tangent);
@@ -56,12 +61,13 @@ Estimate begin_estimate(
     estimate.glossy = has_lobe && estimate.lobe.wo.z > 0.0;
     estimate.matt = has_diffuse;
 #if HAS_SPECULAR
-    estimate.glossy_way = ggx_direction(estimate.lobe, ways.xy);
+    estimate.glossy_way =
+        ggx_direction(estimate.lobe, sequence_point(seed, GLOSSY_WAY));
 #endif
 #if HAS_DIFFUSE
-    estimate.matt_way = cosine_direction(ways.zw);
+    estimate.matt_way = cosine_direction(sequence_point(seed, MATT_WAY));
 #endif
-    estimate.on_light = light.xy;
+    estimate.across = light.y;
     estimate.total_importance = 0.0;
     for (int i = 0; i < light_count; ++i) {
         PlanarLight candidate = light_at(i);
@@ -69,7 +75,7 @@ Estimate begin_estimate(
             light_importance(candidate, plane_view(candidate, position), normal);
     }
     estimate.passed = 0.0;
-    estimate.pick = light.z * estimate.total_importance;
+    estimate.pick = light.x * estimate.total_importance;
     return estimate;
 }
 
@@ -118,11 +124,13 @@ vec3 terms_along(
     return weighted_terms(estimate, wi, chance * density);
 }
 
-vec3 terms_by_area(Estimate estimate, PlanarLight light, PlaneView view, float chance)
+// `along`: in [0, 1), where in the light's share of `pick`.
+vec3 terms_by_area(
+    Estimate estimate, PlanarLight light, PlaneView view, float chance, float along)
 {
     vec4 bounds = light_bounds(light);
     vec2 size = bounds.zw - bounds.xy;
-    vec2 at = bounds.xy + estimate.on_light * size;
+    vec2 at = bounds.xy + vec2(along, estimate.across) * size;
     if (!is_on_light(light, at)) {
         return vec3(0.0);
     }
@@ -155,16 +163,16 @@ vec3 light_terms(inout Estimate estimate, PlanarLight light)
         terms += terms_along(estimate, estimate.matt_way, light, view, chance);
     }
 #endif
-    bool was_passed = estimate.passed > estimate.pick;
+    float along = (estimate.pick - estimate.passed) / importance;
     estimate.passed += importance;
-    if (!was_passed && estimate.passed > estimate.pick) {
-        terms += terms_by_area(estimate, light, view, chance);
+    if (along >= 0.0 && along < 1.0) {
+        terms += terms_by_area(estimate, light, view, chance, along);
     }
     return terms;
 }
 
 // Radiance towards wo. `normal`, `tangent` and `wo` are unit and leave the surface; alpha.x
-// acts along the tangent. `seed`: of the random numbers, another one for every sample.
+// acts along the tangent. `seed`: pixel and index of the sample.
 vec3 shade_lights(
     uvec3 seed, int light_count, vec3 position, vec3 normal, vec3 tangent, vec3 wo, MaterialSample material)
 {

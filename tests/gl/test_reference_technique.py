@@ -243,7 +243,7 @@ def test_pictures_of_lambert_alone(renderer, still):
     assert not mismatch(frames(renderer, floor(material), 200), exact, seen)
 
 
-def test_noise_falls_as_the_root_of_the_samples(renderer, still):
+def test_noise_falls_faster_than_the_root_of_the_samples(renderer, still):
     shot = floor(BRUSHED)
     exact, seen = test_truth.exact(shot)
     deviation = []
@@ -251,8 +251,8 @@ def test_noise_falls_as_the_root_of_the_samples(renderer, still):
         renderer.render(replace(shot, settings=RenderSettings("reference", samples)))
         error = (renderer.radiance() - exact)[seen] / test_truth.RADIANCE
         deviation.append(np.sqrt(np.mean(error**2)))
-    # 700 pixels know their deviation to 3 %, and so its ratio to 4 %.
-    np.testing.assert_allclose(np.divide(deviation[:-1], deviation[1:]), 2.0, rtol=0.15)
+    # Random numbers halve it, to 4 %: 700 pixels know their deviation to 3 %.
+    assert np.all(np.divide(deviation[:-1], deviation[1:]) > 2.3)
 
 
 def test_same_shot_same_bytes(renderer):
@@ -282,7 +282,7 @@ def test_probe_averages_samples(renderer):
             points.alpha,
         )
         errors.append([np.std(out[k][:, 0] - w) for k, w in zip(out, want, strict=True)])
-    np.testing.assert_allclose(np.divide(*errors), 4.0, rtol=0.35)
+    assert np.all(np.divide(*errors) > 4.0)
 
 
 @pytest.mark.parametrize("lamp", [SCENES["square"], SCENES["disk"]], ids=["polygon", "curved"])
@@ -298,7 +298,7 @@ def test_compiled_where_it_is_chosen_only(renderer, lamp, material):
     assert not {"ltc/shade.glsl", "ltc/lobe.glsl", "ltc/contour.glsl", "ltc/tree.glsl"} & {*chosen}
     assert ("ltc/curve.glsl" in chosen) is (lamp is SCENES["disk"])
     for other in ("auto", "ltc", "ggx"):
-        assert not [name for name in files(other) if "reference/" in name or "random" in name]
+        assert not [name for name in files(other) if "reference/" in name or "sequence" in name]
 
 
 def test_evaluations_are_counted(renderer):
