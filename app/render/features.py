@@ -164,7 +164,7 @@ class LightingFeatures:
         (or nothing is shaded).
     technique : str
         Whose shaders are included; the default one's where nothing is glossy, because
-        diffuse reflection is the same in all but those that take curves whole or sample.
+        diffuse reflection is the same in all but those that take curves whole or have their own.
     tangents : bool
         Some glossy material is anisotropic, and the technique shades it so.
     counts : bool
@@ -213,7 +213,7 @@ class LightingFeatures:
             lights.technique(technique)
             if specular
             or lights.curves == "whole"
-            or (diffuse and find_technique(technique).is_sampled)
+            or (diffuse and find_technique(technique).has_own_diffuse)
             else DEFAULT_TECHNIQUE,
             specular
             and find_technique(technique).anisotropic
@@ -262,6 +262,7 @@ def technique_defines(technique: str) -> dict[str, int]:
     defines = {
         "TECHNIQUE_GGX": int(choice.name == "ggx"),
         "TECHNIQUE_REFERENCE": int(choice.name == "reference"),
+        "TECHNIQUE_REPRESENTATIVE_POINT": int(choice.name == "representative-point"),
         "TAKES_TANGENT": int(choice.technique.anisotropic),
         "HAS_TABLES": int(choice.technique.has_tables),
         "CURVE_RULE": choice.technique.curve_rule,

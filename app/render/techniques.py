@@ -48,6 +48,8 @@ class Technique:
     curve_rule : int
         The feature CURVE_RULE: how it integrates along curves that are whole. The number of
         a technique that does not is only not 0, which leaves out the tree's own rule.
+    has_own_diffuse : bool
+        Whether its diffuse part differs from the form factors that the others share.
     parameter : Parameter, optional
         What a number behind its name means.
     """
@@ -58,6 +60,7 @@ class Technique:
     curves: Literal["tree", "whole", "edges"] = "tree"
     curve_rule: int = 0
     is_sampled: bool = False
+    has_own_diffuse: bool = False
     parameter: Parameter | None = None
 
 
@@ -106,6 +109,16 @@ TECHNIQUES: dict[str, Technique] = {
         curves="whole",
         curve_rule=3,
         is_sampled=True,
+        has_own_diffuse=True,
+    ),
+    "representative-point": Technique(
+        "a baseline, what engines did before: each light as its point nearest the mirrored view, "
+        "by Karis 2013",
+        anisotropic=True,
+        has_tables=False,
+        curves="edges",
+        has_own_diffuse=True,
+        parameter=Parameter("edges a curve", 1, 4096, 18),
     ),
 }
 """By name, in the order in which help lists them."""
@@ -142,7 +155,7 @@ class Choice(NamedTuple):
     @property
     def follows_ltc(self) -> bool:
         """Whether it is ``ltc`` but for how it takes curves."""
-        return self.technique.curves != "tree" and not self.technique.is_sampled
+        return self.technique.curves != "tree" and self.technique.has_tables
 
     @property
     def curve_nodes(self) -> int:

@@ -5,6 +5,8 @@
 #include "ggx/shade.glsl"
 #elif TECHNIQUE_REFERENCE
 #include "reference/shade.glsl"
+#elif TECHNIQUE_REPRESENTATIVE_POINT
+#include "representative_point/shade.glsl"
 #else
 #include "ltc/shade.glsl"
 #endif
