@@ -19,6 +19,7 @@ from tests.gl.test_ggx import Points, frames, random_points, which
 from tests.gl.test_probe import light, on_light, random_light
 
 EACH = 256
+SHIFT = np.array([3.0, 0.0])
 ROUNDING = 3e-6
 """Over alpha: a few roundings of a direction, 6e-8 each, are so much of a lobe's width, on which
 GGX depends with the fourth power."""
@@ -104,7 +105,7 @@ def test_holes_and_lights_apart(renderer):
     """In a hole the nearest point is its rim, between two parts that of one of them."""
     square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     rng = np.random.default_rng(5)
-    for contours in ((square, 0.5 * square), (square - [3.0, 0.0], square + [3.0, 0.0])):
+    for contours in ((square, 0.5 * square), (square - SHIFT, square + SHIFT)):
         lamp = light(*contours, plane=Plane((0.0, 2.0, 0.0), (1, 0, 0), (0, 0, 1)), two_sided=True)
         points = points_of(rng, lamp, (0.1, 0.5), aimed=True)
         found, wanted = probe(renderer, lamp, points), twin(lamp, points)

@@ -1,4 +1,4 @@
-"""The baseline of one representative point: its point by brute force, its limits, its known flaws."""
+"""The baseline of one representative point: by brute force, in its limits, and its known flaws."""
 
 from __future__ import annotations
 
