@@ -43,6 +43,7 @@ from app.gui.shortcuts import Action
 from app.gui.viewport import Viewport
 from app.gui.viewport_window import viewport_window
 from app.panels.performance import performance_panel
+from app.panels.plan import plan_panel
 from app.panels.question import unsaved_question
 from app.panels.status import status_bar
 from app.render.renderer import Renderer
@@ -117,6 +118,7 @@ class Window:
             "Display": self._display_window,
             "Camera": self._panels.camera,
             "Performance": self._performance_window,
+            "Plan": self._plan_window,
         }
         return {name: self._guarded(draw) for name, draw in windows.items()}
 
@@ -231,7 +233,12 @@ class Window:
     def _performance_window(self) -> None:
         shot = self.viewport.picture.shot
         if shot is not None:
-            performance_panel(self._reports.of(shot, self.viewport, self.renderer))
+            performance_panel(self._reports.times(shot, self.viewport, self.renderer))
+
+    def _plan_window(self) -> None:
+        shot = self.viewport.picture.shot
+        if shot is not None:
+            plan_panel(self._reports.plan(shot, self.viewport, self.renderer))
 
     # --- the end ------------------------------------------------------------------------
 

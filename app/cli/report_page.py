@@ -9,7 +9,7 @@ from typing import Any
 
 from app.cli.html_page import facts_table, html_page, sortable_table
 from app.cli.log_plot import Point, log_plot
-from app.render.plan import format_bytes
+from app.plan_rows import format_bytes
 
 Row = dict[str, Any]
 """One measured scene and technique: what a line of ``results.csv`` holds, by column."""

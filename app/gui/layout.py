@@ -20,6 +20,7 @@ _SPACES = {
     "Light": "Right",
     "Material": "RightLow",
     "Object": "RightLow",
+    "Plan": "Right",
 }
 """The docked windows and their places; those that share one are tabs."""
 

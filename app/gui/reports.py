@@ -1,12 +1,12 @@
-"""What the performance panel shows: the renderer's times, and its plan in lines."""
+"""What the panels of times and of the plan show of the picture."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from app.gui.viewport import Viewport
-from app.panels.performance import PlanLine, Report
-from app.render.plan import Plan
+from app.panels.performance import Report
+from app.panels.plan import PlanReport
 from app.render.renderer import Renderer
 from app.scene import Shot
 
@@ -23,14 +23,10 @@ class Reports:
 
     def __init__(self) -> None:
         self._planned: Shot | None = None
-        self._plan: tuple[PlanLine, ...] = ()
+        self._plan = PlanReport("", "", ())
 
-    def of(self, shot: Shot, viewport: Viewport, renderer: Renderer) -> Report:
-        """Return the report on the picture that shows ``shot``."""
-        wanted = replace(shot, settings=viewport.settings)
-        if self._planned is None or _other_needs(self._planned, wanted):
-            self._planned = wanted
-            self._plan = plan_lines(renderer.plan(wanted))
+    def times(self, shot: Shot, viewport: Viewport, renderer: Renderer) -> Report:
+        """Return the times of the picture that shows ``shot``."""
         times = renderer.timings(wait=False).items()
         return Report(
             passes=tuple((PASS_NAMES.get(name, name), value) for name, value in times),
@@ -38,26 +34,16 @@ class Reports:
             gpu=str(renderer.ctx.info["GL_RENDERER"]),
             size=(shot.width, shot.height),
             samples=viewport.picture.samples,
-            plan=self._plan,
         )
 
-
-def plan_lines(plan: Plan) -> tuple[PlanLine, ...]:
-    """Return a plan as lines: programs, memory, and what is left out."""
-    lines = [
-        PlanLine("Programs", program.name, f"{program.lines} lines") for program in plan.programs
-    ]
-    lines += [
-        PlanLine(kind, resource.name, f"{resource.bytes / 1024.0:,.0f} KB")
-        for kind, resources in (
-            ("Attachments", plan.attachments),
-            ("Tables", plan.tables),
-            ("Buffers", plan.buffers),
-        )
-        for resource in resources
-    ]
-    lines += [PlanLine("Left out", left.what, left.why, used=False) for left in plan.left_out]
-    return tuple(lines)
+    def plan(self, shot: Shot, viewport: Viewport, renderer: Renderer) -> PlanReport:
+        """Return the plan of the picture that shows ``shot``."""
+        wanted = replace(shot, settings=viewport.settings)
+        if self._planned is None or _other_needs(self._planned, wanted):
+            plan = renderer.plan(wanted)
+            self._plan = PlanReport(plan.title, plan.summary(), plan.sections())
+            self._planned = wanted
+        return self._plan
 
 
 def _other_needs(a: Shot, b: Shot) -> bool:
@@ -67,4 +53,5 @@ def _other_needs(a: Shot, b: Shot) -> bool:
         or a.scene.lights is not b.scene.lights
         or a.scene.objects is not b.scene.objects
         or a.scene.materials is not b.scene.materials
+        or a.scene.display != b.scene.display
     )

@@ -1,4 +1,4 @@
-"""The panel of times, and of what the renderer does for the scene and leaves out."""
+"""The panel of times."""
 
 from __future__ import annotations
 
@@ -8,17 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from app.panels.widgets import ACCENT, MUTED, heading, hint, tooltip
-
-
-@dataclass(frozen=True, slots=True)
-class PlanLine:
-    """One thing that the renderer makes for the present scene, or does without and why."""
-
-    kind: str
-    name: str
-    detail: str
-    used: bool = True
+from app.panels.widgets import ACCENT, hint, tooltip
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +22,6 @@ class Report:
     gpu : name of the renderer
     size : width and height of the picture in pixels
     samples : samples gathered, and how many there will be
-    plan : what is compiled, allocated and loaded
     """
 
     passes: tuple[tuple[str, float], ...] = ()
@@ -40,7 +29,6 @@ class Report:
     gpu: str = ""
     size: tuple[int, int] = (0, 0)
     samples: tuple[int, int] = (0, 0)
-    plan: tuple[PlanLine, ...] = ()
 
 
 def performance_panel(report: Report) -> None:
@@ -60,28 +48,6 @@ def performance_panel(report: Report) -> None:
         imgui.end_table()
     if len(report.history) > 1:
         _history(np.asarray(report.history, dtype=np.float64))
-    kind = ""
-    for line in report.plan:
-        if line.kind != kind:
-            kind = line.kind
-            heading(kind)
-        _plan_line(line)
-
-
-def _plan_line(line: PlanLine) -> None:
-    """Draw a name and, as far as there is room, what there is to say about it."""
-    if not line.used:
-        hint(line.name)
-        tooltip(line.detail)
-        return
-    imgui.text(line.name)
-    room = imgui.get_content_region_avail().x
-    wide, taken = imgui.calc_text_size(line.detail).x, imgui.calc_text_size(line.name).x
-    if wide + taken + imgui.get_font_size() < room:
-        imgui.same_line(imgui.get_cursor_pos_x() + room - wide)
-        imgui.text_colored(MUTED, line.detail)
-    else:
-        tooltip(line.detail)
 
 
 def _history(milliseconds: np.ndarray) -> None:

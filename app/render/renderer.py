@@ -2,7 +2,7 @@
 
 It takes a context and knows neither window nor files, so the same shot gives the
 same bytes wherever it is drawn. What a shot needs is decided in one place
-(`app.render.plan`); here it is carried out, and a part of the scene is uploaded
+(`app.render.needs`); here it is carried out, and a part of the scene is uploaded
 again only when it `is not` the object that was uploaded last.
 """
 
@@ -21,9 +21,10 @@ from app.render.camera import CameraFrame
 from app.render.features import LightNeeds, Limits
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
+from app.render.needs import ATTACHMENTS, FORMAT_BYTES, Needs, needs_of
 from app.render.pack import CurveForm
 from app.render.picking import Hit, Picker, direction_from_octahedral, facing_normal
-from app.render.plan import ATTACHMENTS, FORMAT_BYTES, Needs, Plan, make_plan, needs_of
+from app.render.plan import Plan, make_plan
 from app.render.post import DisplayPass
 from app.render.programs import Programs
 from app.render.sampling import pixel_offset

@@ -9,7 +9,8 @@ import pytest
 from app.errors import InputError
 from app.render.features import LightingFeatures, Limits
 from app.render.lighting import lighting_spec
-from app.render.plan import Plan, make_plan, needs_of
+from app.render.needs import needs_of
+from app.render.plan import Plan, make_plan
 from app.render.programs import ProgramSpec, shader_roots
 from app.render.techniques import TECHNIQUES, find_technique
 from app.scene import (

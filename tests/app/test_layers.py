@@ -23,7 +23,7 @@ PURE = {
     "app.gui.shortcuts", "app.gui.beginning", "app.gui.documents", "app.gui.imports",
     "app.gui.file_types",
     "app.loops", "app.text", "app.text_runs", "app.svg", "app.svg_paths", "app.svg_tree",
-    "app.json_reader", "app.json_writer", "app.light_io",
+    "app.json_reader", "app.json_writer", "app.light_io", "app.plan_rows",
 }  # fmt: skip
 WINDOW = {
     "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",

@@ -20,7 +20,7 @@ from app.presets import disk, ellipse, heart, ring
 from app.render.camera import CameraFrame
 from app.render.features import Limits
 from app.render.light_shapes import TEXELS_PER_PIECE, outline_bands, pack_light_curves
-from app.render.plan import needs_of
+from app.render.needs import needs_of
 from app.render.renderer import Renderer
 from app.scene import (
     AreaLight,

@@ -22,8 +22,11 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app import edits, lights, planes
+from app import window as window_module
 from app.editor import NOTHING, Selection
 from app.panels.export import Export
+from app.panels.plan import PlanReport
+from app.plan_rows import section_lines
 from app.render.colour_maps import VIRIDIS
 from app.scene import (
     AreaLight,
@@ -64,6 +67,9 @@ SCENE = Scene(
     camera=Camera((0.0, 1.3, 4.5), (0.0, 0.8, 0.0)),
     display=Display(0.0, "agx"),
 )
+
+
+HIDDEN = replace(SCENE.lights[0], visible=False)
 
 
 def start(app: Application) -> None:
@@ -430,7 +436,7 @@ def same_picture_as_headless(app: Application, out: Path) -> None:
 def idle_when_nothing_changes(app: Application, out: Path) -> None:
     passes = app.window.renderer.lighting_passes
     assert app.window.viewport.picture.samples == (SAMPLES, SAMPLES)
-    for _ in range(30):
+    for _ in range(100):
         app.frame()
     assert app.window.renderer.lighting_passes == passes
     app.enter("##exposure", 1.0)
@@ -439,6 +445,46 @@ def idle_when_nothing_changes(app: Application, out: Path) -> None:
     app.enter("##radiance", 2.0)
     app.settle()
     assert app.window.renderer.lighting_passes > passes
+
+
+def read_the_plan(app: Application, out: Path) -> None:
+    """The panel holds what ``explain`` prints, and follows the scene."""
+    drawn = []
+    draw = window_module.plan_panel
+
+    def record(report: PlanReport) -> None:
+        drawn.append(report)
+        draw(report)
+
+    window_module.plan_panel = record
+    try:
+        app.click("###Plan")
+        app.settle()
+        _same_as_explained(app, drawn[-1])
+        before = drawn[-1]
+        app.window.editor.apply("Hide", edits.replace_light(SCENE, 0, HIDDEN))
+        app.settle()
+        app.frame()
+        _same_as_explained(app, drawn[-1])
+        assert "light shapes" in {row.name for row in before.sections[1].rows}
+        assert "light shapes" not in {row.name for row in drawn[-1].sections[1].rows}
+        assert any(row.why == "no light is visible" for row in drawn[-1].sections[-1].rows)
+        count = len(drawn)
+        app.frame()
+        assert drawn[-1] is drawn[count - 1], "nothing is planned again for the same picture"
+    finally:
+        window_module.plan_panel = draw
+        app.click("###Light")
+
+
+def _same_as_explained(app: Application, report: PlanReport) -> None:
+    shot = app.window.viewport.picture.shot
+    assert shot is not None
+    plan = app.window.renderer.plan(replace(shot, settings=app.window.viewport.settings))
+    assert report == PlanReport(plan.title, plan.summary(), plan.sections())
+    for section in report.sections:
+        for line in section_lines(section):
+            assert line in plan.text()
 
 
 def export_pictures(app: Application, out: Path) -> None:
@@ -571,6 +617,7 @@ SCENARIOS = (
     save_and_open_by_the_dialog,
     same_picture_as_headless,
     idle_when_nothing_changes,
+    read_the_plan,
     export_pictures,
     failures_become_messages,
     meshes_can_be_dropped,

@@ -37,6 +37,7 @@ SCENARIOS = (
     "save_and_open_by_the_dialog",
     "same_picture_as_headless",
     "idle_when_nothing_changes",
+    "read_the_plan",
     "export_pictures",
     "failures_become_messages",
     "meshes_can_be_dropped",
