@@ -10,7 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.files import check_output, replace_file
+from app.errors import InputError, expected_one_of
+from app.files import check_output, read_file, replace_file
 
 IMAGE_SUFFIXES = (".png", ".exr")
 
@@ -72,3 +73,57 @@ def exr_bytes(radiance: NDArray[np.float32]) -> bytes:
         with OpenEXR.File(header, channels) as file:
             file.write(str(path))
         return path.read_bytes()
+
+
+MOST_IMAGE_BYTES = 2**30
+"""A larger picture file is not read."""
+
+
+def read_image(path: Path) -> NDArray[np.float32] | NDArray[np.uint8]:
+    """Return what a picture file holds, (h, w, 3), the top row first.
+
+    Returns
+    -------
+    float32 of an ``.exr``, linear radiance; uint8 of a ``.png``, sRGB colours. A channel of
+    opacity is left out; grey pictures get three equal channels.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, too large, damaged, has another suffix or no colours.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in IMAGE_SUFFIXES:
+        found = f"the suffix '{path.suffix}'" if suffix else "no suffix"
+        raise InputError(f"{path}: found {found}, {expected_one_of(suffix, IMAGE_SUFFIXES)}")
+    data = read_file(path, "a picture", suffix, MOST_IMAGE_BYTES)
+    return _read_png(path, data) if suffix == ".png" else _read_exr(path)
+
+
+def _read_png(path: Path, data: bytes) -> NDArray[np.uint8]:
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
+            if image.mode.startswith("I"):
+                raise InputError(f"{path}: found 16 bits a channel, expected 8")
+            return np.array(image.convert("RGB"))
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise InputError(f"{path}: the file is damaged or no PNG picture ({error})") from error
+
+
+def _read_exr(path: Path) -> NDArray[np.float32]:
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path)) as file:
+            channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
+    except (OSError, RuntimeError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: the file is damaged or no OpenEXR picture") from error
+    for name in ("RGB", "RGBA"):
+        if name in channels:
+            return np.ascontiguousarray(channels[name][..., :3], dtype=np.float32)
+    if not {"R", "G", "B"} <= set(channels):
+        found = ", ".join(channels) or "none"
+        raise InputError(f"{path}: found the channels {found}, expected R, G and B")
+    return np.stack([channels[name].astype(np.float32) for name in "RGB"], axis=-1)

@@ -23,6 +23,7 @@ from typer.core import TyperGroup
 
 from app.cli.bench import bench
 from app.cli.common import FailureError, messages, scene_path
+from app.cli.compare import compare
 from app.cli.explain import explain
 from app.cli.probe import probe
 from app.cli.report import report
@@ -138,6 +139,7 @@ app.command()(shot)
 app.command()(probe)
 app.command()(bench)
 app.command()(report)
+app.command()(compare)
 app.command()(explain)
 
 

@@ -197,9 +197,9 @@ class Scale:
         """
         a, b = names
         label = {
-            "signed": f"{a} − {b}, {self.measure}",
-            "absolute": f"|{a} − {b}|, {self.measure}",
-            "relative": f"|{a} − {b}| / {b}, {self.measure}",
+            "signed": f"{a} - {b}, {self.measure}",
+            "absolute": f"|{a} - {b}|, {self.measure}",
+            "relative": f"|{a} - {b}| / {b}, {self.measure}",
             "flip": f"FLIP of {a} and {b}: 0 no visible difference",
         }[self.view]
         places = np.linspace(0.0, 1.0, 5)

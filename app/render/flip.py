@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
+from app.render.tone_map import linear_from_srgb
+
 FloatArray = NDArray[np.float64]
 
 PIXELS_PER_DEGREE = 0.7 * (3840.0 / 0.7) * np.pi / 180.0
@@ -94,8 +96,7 @@ def flip(
 def _linear(picture: NDArray[np.uint8] | FloatArray) -> FloatArray:
     """Return linear components of sRGB codes."""
     whole = np.issubdtype(picture.dtype, np.integer)
-    code = np.clip(picture.astype(np.float64) / (255.0 if whole else 1.0), 0.0, 1.0)
-    return np.asarray(np.where(code > 0.04045, ((code + 0.055) / 1.055) ** 2.4, code / 12.92))
+    return linear_from_srgb(np.clip(picture / (255.0 if whole else 1.0), 0.0, 1.0))
 
 
 def _opponent_from_xyz(xyz: FloatArray) -> FloatArray:

@@ -111,6 +111,12 @@ def srgb_from_linear(linear: ArrayLike) -> FloatArray:
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0) ** (1.0 / 2.4) - 0.055)
 
 
+def linear_from_srgb(code: ArrayLike) -> FloatArray:
+    """Return the linear values of sRGB code values in [0, 1], inverse to `srgb_from_linear`."""
+    y = np.asarray(code, dtype=np.float64)
+    return np.where(y <= 0.04045, y / 12.92, ((y + 0.055) / 1.055) ** 2.4)
+
+
 def bayer_thresholds(width: int, height: int) -> FloatArray:
     """Return (height, width) dither thresholds in (0, 1), row 0 at the top of the picture."""
     y, x = np.mgrid[height - 1 : -1 : -1, 0:width] if height else np.mgrid[0:0, 0:width]

@@ -19,6 +19,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli.main import app, run
+from app.images import exr_bytes, png_bytes
 from app.render.techniques import TECHNIQUES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,6 +29,7 @@ PLY_HEAD = (
     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
     "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
 )
+PIXELS = np.arange(60, dtype=np.uint8).reshape(4, 5, 3)
 SHOT = ("shot", "scene.json", "-o", "out.png")
 PROBE = ("probe", "scene.json", "points.npz", "-o", "out.npz")
 
@@ -95,7 +97,7 @@ def bad_points(content: bytes | str | None, *parts: str) -> Case:
     return Case({"scene.json": scene(), "points.npz": content}, parts, PROBE, "points.npz")
 
 
-def bad_arguments(*arguments: str, parts: tuple[str, ...], **files: str) -> Case:
+def bad_arguments(*arguments: str, parts: tuple[str, ...], **files: str | bytes) -> Case:
     return Case({"scene.json": scene(), **files}, parts, arguments, "")
 
 
@@ -457,6 +459,48 @@ CASES: dict[str, Case] = {
     "report of two of one name": bad_arguments(
         "report", "scene.json", "./scene.json", "-o", "out", parts=("named 'scene' too",)
     ),
+    "compare one picture": bad_arguments("compare", "a.exr", parts=("a.exr", "two to compare")),
+    "compare a scene with a picture": bad_arguments(
+        "compare", "scene.json", "a.exr", parts=("a.exr", "--against")
+    ),
+    "compare with an unknown technique": bad_arguments(
+        "compare", "scene.json", "--against", "refrence", parts=("'refrence'", "mean 'reference'")
+    ),
+    "compare's view": bad_arguments(
+        "compare", "scene.json", "--view", "sined", parts=("--view", "mean 'signed'")
+    ),
+    "compare's measure": bad_arguments(
+        "compare", "scene.json", "--of", "hue", parts=("--of", "'hue'", "luminance")
+    ),
+    "compare's map": bad_arguments(
+        "compare", "scene.json", "--map", "jet", parts=("--map", "'jet'", "magma")
+    ),
+    "compare's range": bad_arguments(
+        "compare", "scene.json", "--range", "-1", parts=("--range is -1", "above 0")
+    ),
+    "compare to text": bad_arguments(
+        "compare", "scene.json", "-o", "out.txt", parts=("out.txt", ".png")
+    ),
+    "compare pictures that are not there": bad_arguments(
+        "compare", "a.png", "b.png", parts=("a.png", "no such file")
+    ),
+    "compare pictures of two kinds": bad_arguments(
+        "compare", "a.png", "b.exr",
+        **{"a.png": png_bytes(PIXELS), "b.exr": exr_bytes(PIXELS.astype(np.float32))},
+        parts=("b.exr", "another .png"),
+    ),
+    "compare pictures of two sizes": bad_arguments(
+        "compare", "a.png", "b.png",
+        **{"a.png": png_bytes(PIXELS), "b.png": png_bytes(PIXELS[:2])},
+        parts=("b.png", "5x2", "5x4"),
+    ),
+    "compare a damaged PNG": bad_arguments(
+        "compare", "a.png", "a.png", **{"a.png": png_bytes(PIXELS)[:50]},
+        parts=("a.png", "damaged"),
+    ),
+    "compare a damaged EXR": bad_arguments(
+        "compare", "a.exr", "a.exr", **{"a.exr": "no picture"}, parts=("a.exr", "damaged"),
+    ),
     "explain a technique": bad_arguments(
         "explain", "scene.json", "--technique", "q", parts=("'q'", "ltc")
     ),
@@ -647,7 +691,7 @@ def test_an_error_of_the_program_is_exit_code_1(
 
 
 @pytest.mark.parametrize("option", ["-h", "--help"])
-@pytest.mark.parametrize("command", ["shot", "probe", "bench", "report", "explain"])
+@pytest.mark.parametrize("command", ["shot", "probe", "bench", "report", "compare", "explain"])
 def test_help_shows_an_example(command: str, option: str) -> None:
     result = CliRunner().invoke(app, [command, option])
     assert result.exit_code == 0
@@ -664,7 +708,7 @@ def test_help_of_the_program_names_every_command() -> None:
     assert "window" not in re.sub("(?i)the window|a window", "", result.stdout)
 
 
-@pytest.mark.parametrize("command", ["shot", "probe", "bench", "report", "explain"])
+@pytest.mark.parametrize("command", ["shot", "probe", "bench", "report", "compare", "explain"])
 def test_techniques_are_listed(command: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert run([command, "--technique", "help"]) == 0
     out, err = capfd.readouterr()

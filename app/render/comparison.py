@@ -1,0 +1,116 @@
+"""Two pictures of one view and everything that is made of them without a GPU.
+
+Used by the command line and, in the background, by the window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.render import difference as of
+from app.render.colour_maps import INK, PAPER, draw_legend
+from app.render.difference import Measure, Numbers, Scale
+from app.render.flip import flip
+from app.scene import MAX_SAMPLES, AreaLight
+
+SAMPLED = 256
+"""Samples a pixel of a technique that samples, unless told otherwise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """What is compared: A with B.
+
+    Attributes
+    ----------
+    names : (str, str)
+        Techniques, or files.
+    a, b : (h, w, 3) float32
+        Linear radiance.
+    shown_a, shown_b : (h, w, 3) uint8
+        What the display shows of them, sRGB.
+    lights : sequence of AreaLight
+        The scene's; empty where pictures come from files.
+    standard_error : (h, w, 3) float32 or None
+        Of B's pixels, where B is an estimate that knows it.
+    """
+
+    names: tuple[str, str]
+    a: NDArray[np.float32]
+    b: NDArray[np.float32]
+    shown_a: NDArray[np.uint8]
+    shown_b: NDArray[np.uint8]
+    lights: Sequence[AreaLight] = ()
+    standard_error: NDArray[np.float32] | None = None
+
+    def numbers(self, measure: Measure) -> Numbers:
+        """Return the differences in numbers."""
+        return of.numbers(self.a, self.b, measure, self.lights, self.standard_error)
+
+    def flip(self) -> NDArray[np.float64]:
+        """Return FLIP of what the display shows, (h, w)."""
+        return flip(self.shown_a, self.shown_b)
+
+    def values(
+        self, view: of.DifferenceView, measure: Measure, floor: float
+    ) -> NDArray[np.float64]:
+        """Return what a view shows, (h, w); ``floor`` as `Numbers.floor`."""
+        if view == "flip":
+            return self.flip()
+        return of.values_of(view, self.a, self.b, measure, floor)
+
+    def coloured(self, values: NDArray[np.float64], scale: Scale) -> NDArray[np.uint8]:
+        """Return the colours of what `values` returned, with their legend, (h, w, 3)."""
+        bad = not np.isfinite(values).all()
+        return draw_legend(of.colours_of(values, scale), scale.legend(self.names, bad))
+
+    def split(self) -> NDArray[np.uint8]:
+        """Return what the display shows, A left and B right of the middle, with their names."""
+        middle = self.shown_a.shape[1] // 2
+        both = np.array(self.shown_a)
+        both[:, middle:] = self.shown_b[:, middle:]
+        return _labelled(both, self.names)
+
+
+def shared_samples(
+    wanted: int, sampled: tuple[bool, bool], estimates: int = SAMPLED
+) -> tuple[int, int, int]:
+    """Return how many samples A and B take, and how many positions in a pixel they share.
+
+    Parameters
+    ----------
+    wanted : int
+        Positions, and the samples of a technique that has the same result every time.
+    sampled : (bool, bool)
+        Whether A and B are random estimates.
+    estimates : int
+        Least samples of those; rounded up to a multiple of ``wanted``.
+    """
+    most = wanted * (MAX_SAMPLES // wanted)
+    more = min(-(-max(estimates, wanted) // wanted) * wanted, most)
+    a, b = (more if random else wanted for random in sampled)
+    return a, b, wanted
+
+
+def _labelled(picture: NDArray[np.uint8], names: tuple[str, str]) -> NDArray[np.uint8]:
+    """Return a picture with a line down the middle and names at the top on both its sides."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    image = Image.fromarray(np.ascontiguousarray(picture))
+    draw = ImageDraw.Draw(image)
+    em = max(10, min(image.width // 45, 28))
+    font = ImageFont.load_default(em)
+    middle = image.width // 2
+    draw.line((middle, 0, middle, image.height), fill=INK)
+    for name, x, anchor in ((names[0], middle - em, "ra"), (names[1], middle + em, "la")):
+        left, top, right, bottom = draw.textbbox((x, em // 2), name, font=font, anchor=anchor)
+        if left < 0 or right > image.width or bottom > image.height:
+            continue
+        pad = em // 4
+        draw.rectangle((left - pad, top - pad, right + pad, bottom + pad), fill=PAPER)
+        draw.text((x, em // 2), name, fill=INK, font=font, anchor=anchor)
+    return np.array(image)
