@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.render.camera import CameraFrame
+from app.render.features import LightingFeatures
 from app.render.gbuffer import GBufferPass
+from app.render.lighting import LightingPass
 from app.render.state import release_framebuffer
 from app.scene import Vec3
 
@@ -42,21 +44,13 @@ class Picker:
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
         self._target: moderngl.Framebuffer | None = None
+        self._counted: moderngl.Framebuffer | None = None
 
     def pick(
         self, gbuffer: GBufferPass, frame: CameraFrame, size: tuple[int, int], x: float, y: float
     ) -> Hit | None:
         """Return what ``gbuffer`` holds at pixel coordinates from the top left, or None."""
-        if self._target is None:
-            kinds = (4, 2)  # as `app.render.gbuffer` has them
-            self._target = self._ctx.framebuffer(
-                color_attachments=[self._ctx.texture((1, 1), n, dtype="f4") for n in kinds],
-                depth_attachment=self._ctx.depth_renderbuffer((1, 1)),
-            )
-        width, height = size
-        ndc = (2.0 * x / width - 1.0, 1.0 - 2.0 * y / height)
-        window = (float(width), float(height), -ndc[0] * width, -ndc[1] * height)
-        gbuffer.draw(self._target, frame, window)
+        self._draw(gbuffer, frame, size, x, y)
         surface = self._read(0, 4)
         depth, identity = float(surface[2]), int(surface[3])
         if depth <= 0.0:
@@ -72,6 +66,53 @@ class Picker:
             tangent = _vec3(direction_from_octahedral(self._read(1, 2)[None])[0])
         return Hit("object", identity, position, _vec3(normal), tangent)
 
+    def evaluations(
+        self,
+        gbuffer: GBufferPass,
+        lighting: LightingPass,
+        features: LightingFeatures,
+        frame: CameraFrame,
+        size: tuple[int, int],
+        x: float,
+        y: float,
+    ) -> int:
+        """Return how often ``lighting`` evaluates its integral there, lights and all.
+
+        ``features`` are those of the picture, counting.
+        """
+        target = self._draw(gbuffer, frame, size, x, y)
+        if self._counted is None:
+            texture = self._ctx.texture((1, 1), 4, dtype="f4")
+            self._counted = self._ctx.framebuffer(color_attachments=[texture])
+        surfaces, tangents = target.color_attachments
+        assert isinstance(surfaces, moderngl.Texture)
+        assert isinstance(tangents, moderngl.Texture)
+        # A picture of this pixel alone, whose middle is the point.
+        ray = frame.ray(x, y, size)
+        pixel = CameraFrame(frame.eye, ray, frame.right / size[0], frame.up / size[1])
+        lighting.draw(
+            self._counted, surfaces, tangents if features.tangents else None, features, pixel,
+            (0.0, 0.0), None, 0,
+        )  # fmt: skip
+        raw = self._counted.read(components=1, dtype="f4")
+        return round(float(np.frombuffer(raw, dtype=np.float32)[0]))
+
+    def _draw(
+        self, gbuffer: GBufferPass, frame: CameraFrame, size: tuple[int, int], x: float, y: float
+    ) -> moderngl.Framebuffer:
+        """Draw the surface at pixel coordinates; return where."""
+        if self._target is None:
+            kinds = (4, 2)  # as `app.render.gbuffer` has them
+            self._target = self._ctx.framebuffer(
+                color_attachments=[self._ctx.texture((1, 1), n, dtype="f4") for n in kinds],
+                depth_attachment=self._ctx.depth_renderbuffer((1, 1)),
+            )
+        width, height = size
+        ndc = (2.0 * x / width - 1.0, 1.0 - 2.0 * y / height)
+        window = (float(width), float(height), -ndc[0] * width, -ndc[1] * height)
+        gbuffer.draw(self._target, frame, window)
+        return self._target
+
     def _read(self, attachment: int, components: int) -> FloatArray:
         assert self._target is not None
         raw = self._target.read(components=components, attachment=attachment, dtype="f4")
@@ -79,14 +120,15 @@ class Picker:
 
     def release(self) -> None:
         """Release every GPU object."""
-        if self._target is None:
-            return
-        attachments = (*self._target.color_attachments, self._target.depth_attachment)
-        release_framebuffer(self._target)
-        for attachment in attachments:
-            if attachment is not None:
-                attachment.release()
-        self._target = None
+        for target in (self._target, self._counted):
+            if target is None:
+                continue
+            attachments = (*target.color_attachments, target.depth_attachment)
+            release_framebuffer(target)
+            for attachment in attachments:
+                if attachment is not None:
+                    attachment.release()
+        self._target = self._counted = None
 
 
 def direction_from_octahedral(p: FloatArray) -> FloatArray:

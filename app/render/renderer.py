@@ -31,7 +31,7 @@ from app.render.sampling import pixel_offset
 from app.render.state import begin_pass, release_framebuffer
 from app.render.techniques import find_technique, suited_technique, technique_of
 from app.render.timers import PassTimers
-from app.scene import Display, PixelView, RenderSettings, Scene, Shot
+from app.scene import Display, PixelView, RenderSettings, Scene, Shot, Vec3
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +230,7 @@ class Renderer:
         RuntimeError
             If nothing was rendered yet.
         """
-        radiance = self._radiance_texture()
+        radiance = self.radiance_texture
         with self._timers.measure("display"):
             self._display.draw(framebuffer, radiance, shot.scene.display, self._view)
 
@@ -242,7 +242,7 @@ class Renderer:
         RuntimeError
             If nothing was rendered yet.
         """
-        return _top_down(self._radiance_texture(), np.float32)
+        return _top_down(self.radiance_texture, np.float32)
 
     def display(self) -> NDArray[np.uint8]:
         """Return the display colours (h, w, 3) uint8 sRGB, row 0 at the top.
@@ -263,7 +263,7 @@ class Renderer:
         RuntimeError
             If nothing was rendered yet.
         """
-        radiance = self._radiance_texture()
+        radiance = self.radiance_texture
         assert self._seen is not None
         wanted = self._seen.shot.scene.display
         if self._displayed != wanted:
@@ -273,7 +273,60 @@ class Renderer:
             self._displayed = wanted
         return self._targets.texture("display")
 
+    @property
+    def radiance_texture(self) -> moderngl.Texture:
+        """The mean linear radiance as an RGBA32F texture, row 0 at the bottom; alpha is coverage.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        if self._seen is None or not self._newest:
+            raise RuntimeError("nothing was rendered yet")
+        return self._targets.texture(self._newest)
+
     # Questions
+
+    def radiance_at(self, column: int, row: int) -> Vec3:
+        """Return the mean linear radiance of one pixel, counted from the top left.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        ValueError
+            If there is no such pixel.
+        """
+        width, height = self.radiance_texture.size
+        if not (0 <= column < width and 0 <= row < height):
+            raise ValueError(f"pixel ({column}, {row}) is not in a picture of {width}x{height}")
+        place = (column, height - 1 - row, 1, 1)
+        raw = self._targets.framebuffer(self._newest).read(place, components=3, dtype="f4")
+        red, green, blue = np.frombuffer(raw, dtype=np.float32).tolist()
+        return red, green, blue
+
+    def evaluations_at(self, x: float, y: float) -> int:
+        """Return how often the contour integral is evaluated for one point of the last shot.
+
+        Pixel coordinates are those of `pick`. A technique that samples counts one sample. The
+        program that counts is compiled the first time.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        if self._seen is None or self._needs is None:
+            raise RuntimeError("nothing was rendered yet")
+        shot = self._seen.shot
+        lighting = replace(self._needs.lighting, counts=True, accumulates=False)
+        if not lighting.lit:
+            return 0
+        self._hold_geometry(shot.scene, self._gbuffer.has_tangents)
+        frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
+        size = (shot.width, shot.height)
+        return self._picker.evaluations(self._gbuffer, self._lighting, lighting, frame, size, x, y)
 
     def pick(self, x: float, y: float) -> Hit | None:
         """Return what the last shot shows at pixel coordinates from the top left, or None.
@@ -600,11 +653,6 @@ class Renderer:
     @property
     def _view(self) -> PixelView:
         return "radiance" if self._seen is None else self._seen.shot.settings.view
-
-    def _radiance_texture(self) -> moderngl.Texture:
-        if self._seen is None or not self._newest:
-            raise RuntimeError("nothing was rendered yet")
-        return self._targets.texture(self._newest)
 
 
 def _top_down(texture: moderngl.Texture, dtype: DTypeLike) -> NDArray[Any]:
