@@ -11,14 +11,16 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.table import Table
 
 from app.cli.common import (
+    EverythingOption,
     SizeOption,
     Steps,
     TechniquesOption,
@@ -30,11 +32,15 @@ from app.cli.common import (
     results,
     whole_number,
 )
-from app.cli.measure import Errors, Exact, Quartiles, mean_evaluations, measure_passes
+from app.cli.measure import Errors, Exact, Quartiles, mean_evaluations, measure_in_turn
 from app.errors import InputError
 from app.files import check_output, replace_file
+from app.plan_rows import format_bytes
 from app.render.techniques import AUTOMATIC, suited_technique, technique_of
 from app.scene import ALPHA_MIN, Material, RenderSettings, Scene, Shot
+
+if TYPE_CHECKING:
+    from app.render.renderer import Renderer
 
 BASELINE = "no shading"
 """The row whose materials reflect nothing: what the passes cost without the integrals."""
@@ -52,6 +58,7 @@ class Row:
     ``alpha`` is what all materials were given, None where they keep their own; ``errors``
     are those of specular and diffuse radiance, empty where none were asked for; so are
     ``evaluations`` of the contour integral, their mean over pixels that show surfaces.
+    ``everything`` says that nothing was left out, ``bytes`` what was allocated.
     """
 
     scene: str
@@ -61,6 +68,8 @@ class Row:
     wall: Quartiles
     errors: dict[str, Errors]
     evaluations: float | None
+    everything: bool
+    bytes: int
 
 
 @dataclass(frozen=True)
@@ -117,6 +126,7 @@ def bench(
             show_default=False,
         ),
     ] = 0,
+    everything: EverythingOption = False,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON too.")
     ] = None,
@@ -133,6 +143,9 @@ def bench(
     lights with radiance 1 on a white material; and how often a pixel evaluates the
     integral along the outlines, which no other program on the machine can disturb.
 
+    --everything measures each row a second time, frame by frame in turn, with one
+    program for all scenes and nothing left out: what the scene spares.
+
     \b
     Examples:
       ltc-viewer bench quad.json star.json --technique ltc --size 1920x1080 --json times.json
@@ -148,22 +161,27 @@ def bench(
         check_output(json_file, "a table of figures", (".json",))
     loaded = [(name, named_scene(name)) for name in scenes]
     jobs = list(_jobs(loaded, techniques, alphas, width, height))
-    with headless_renderer() as (ctx, renderer):
+    with headless_renderer() as (ctx, renderer), ExitStack() as stack:
         device = str(ctx.info["GL_RENDERER"])
         if is_software(device):
             renderer.use_wall_clock()
         rows = []
         exact = Exact(renderer, points)
-        with Steps("measuring", len(jobs) * (warm_up + repeats)) as steps:
+        renderers = [renderer, *([stack.enter_context(_full(renderer))] if everything else [])]
+        with Steps("measuring", len(jobs) * (warm_up + repeats) * len(renderers)) as steps:
             for job in jobs:
-                passes, wall = measure_passes(ctx, renderer, job.shot, warm_up, repeats, steps)
-                errors, evaluations = {}, None
-                if points and job.technique != BASELINE:
-                    errors = exact.errors(job.shot)
-                    evaluations = mean_evaluations(renderer, job.shot)
-                rows.append(
-                    Row(job.scene, job.technique, job.alpha, passes, wall, errors, evaluations)
-                )
+                measured = measure_in_turn(ctx, renderers, job.shot, warm_up, repeats, steps)
+                for one, (passes, wall) in zip(renderers, measured, strict=True):
+                    errors, evaluations, held = {}, None, sum(one.allocated().values())
+                    if points and job.technique != BASELINE and not one.everything:
+                        errors = exact.errors(job.shot)
+                        evaluations = mean_evaluations(one, job.shot)
+                    rows.append(
+                        Row(
+                            job.scene, job.technique, job.alpha, passes, wall, errors,
+                            evaluations, one.everything, held,
+                        )
+                    )  # fmt: skip
         source = renderer.timing_source
         version = str(ctx.info["GL_VERSION"])
     console = results()
@@ -189,6 +207,18 @@ def bench(
         }
         text = json.dumps(figures, indent=2) + "\n"
         replace_file(json_file, text.encode("utf-8"), "a table of figures")
+
+
+@contextmanager
+def _full(like: Renderer) -> Iterator[Renderer]:
+    """Make a renderer that leaves nothing out, and measures time as ``like`` does."""
+    renderer = type(like)(like.ctx, everything=True)
+    if like.timing_source == "wall clock":
+        renderer.use_wall_clock()
+    try:
+        yield renderer
+    finally:
+        renderer.release()
 
 
 def _jobs(
@@ -230,6 +260,9 @@ def _table(rows: list[Row], title: str) -> Table:
     for name in (*names, "wall"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("repeats", justify="right")
+    has_memory = any(row.everything for row in rows)
+    if has_memory:
+        table.add_column("memory", justify="right", no_wrap=True)
     lobes = list(dict.fromkeys(lobe for row in rows for lobe in row.errors))
     for lobe in lobes:
         table.add_column(f"{lobe} error: mean, p95, max", justify="right", no_wrap=True)
@@ -239,11 +272,12 @@ def _table(rows: list[Row], title: str) -> Table:
         count = "-" if row.evaluations is None else f"{row.evaluations:.1f}"
         table.add_row(
             Path(row.scene).stem,
-            row.technique,
+            f"{row.technique}, everything" if row.everything else row.technique,
             *(["-" if row.alpha is None else f"{row.alpha:g}"] if has_alpha else []),
             *(_cell(row.passes.get(name)) for name in names),
             _cell(row.wall),
             str(row.wall.repeats),
+            *([format_bytes(row.bytes)] if has_memory else []),
             *(_error_cell(row.errors.get(lobe)) for lobe in lobes),
             *([count] if lobes else []),
         )

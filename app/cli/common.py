@@ -105,6 +105,10 @@ TechniqueOption = Annotated[
         is_eager=True,
     ),
 ]
+EverythingOption = Annotated[
+    bool,
+    typer.Option("--everything", help="Compare with one program for all scenes, all left in."),
+]
 TechniquesOption = Annotated[
     list[str],
     typer.Option(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from app.cli.common import (
     DEFAULT_SIZE,
+    EverythingOption,
     FailureError,
     SamplesOption,
     SceneArgument,
@@ -20,11 +21,12 @@ from app.cli.common import (
     messages,
     named_scene,
 )
+from app.render.features import Limits
+from app.render.plan import make_plan
+from app.render.plan_difference import difference_text
+from app.render.programs import shader_roots
 from app.render.techniques import AUTOMATIC, suited_technique
 from app.scene import RenderSettings, Shot
-
-if TYPE_CHECKING:
-    from app.render.plan import Plan
 
 
 def explain(
@@ -32,33 +34,42 @@ def explain(
     size: SizeOption = DEFAULT_SIZE,
     samples: SamplesOption = 16,
     technique: TechniqueOption = AUTOMATIC,
+    everything: EverythingOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
     """Say what is compiled, allocated, loaded and run for a scene, and what is left out and why.
 
+    --everything prints, side by side, what the scene needs and what one program for
+    all scenes would take, with nothing left out: the same picture at a higher cost.
+
     \b
-    Example:
+    Examples:
       ltc-viewer explain scene.json --size 1920x1080
+      ltc-viewer explain scene.json --samples 1 --everything
     """
     width, height = image_size(size)
     suited_technique(technique, anisotropic=False)
     settings = RenderSettings(technique=technique, samples=samples)
-    plan = _plan(Shot(named_scene(scene), settings, width, height))
+    shot = Shot(named_scene(scene), settings, width, height)
+    limits = _limits()
+    plan = make_plan(shot, limits, shader_roots())
+    full = make_plan(shot, limits, shader_roots(), everything=True) if everything else None
     if as_json:
-        typer.echo(json.dumps({**asdict(plan), "bytes": plan.bytes}, indent=2))
+        parts = {**asdict(plan), "bytes": plan.bytes}
+        if full is not None:
+            parts["everything"] = {**asdict(full), "bytes": full.bytes}
+        typer.echo(json.dumps(parts, indent=2))
+    elif full is not None:
+        typer.echo(difference_text(plan, full), nl=False)
     else:
         typer.echo(plan.text(), nl=False)
 
 
-def _plan(shot: Shot) -> Plan:
-    """Plan for this machine's limits, or for those of every OpenGL 4.1 where there is no GL."""
+def _limits() -> Limits:
+    """Return this machine's limits, or those of every OpenGL 4.1 where there is no GL."""
     try:
         with headless_renderer() as (_, renderer):
-            return renderer.plan(shot)
+            return renderer.limits
     except FailureError as error:
-        from app.render.features import Limits
-        from app.render.plan import make_plan
-        from app.render.programs import shader_roots
-
         messages().print(f"Planned for the least that OpenGL 4.1 allows, because {error}")
-        return make_plan(shot, Limits(), shader_roots())
+        return Limits()

@@ -7,6 +7,7 @@ float64 along the very curves (`app.render.truth`).
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -153,10 +154,28 @@ def measure_passes(
     wall : Quartiles
         Of the whole frame with a glFinish [ms].
     """
+    return measure_in_turn(ctx, [renderer], shot, warm_up, repeats, steps)[0]
+
+
+def measure_in_turn(
+    ctx: moderngl.Context,
+    renderers: Sequence[Renderer],
+    shot: Shot,
+    warm_up: int,
+    repeats: int,
+    steps: Steps | None = None,
+) -> list[tuple[dict[str, Quartiles], Quartiles]]:
+    """Render a shot with several renderers, a frame each in turn.
+
+    What else the machine does then disturbs all alike. Returns for each what
+    `measure_passes` does.
+    """
     before = steps.count if steps is not None else 0
-    times: dict[str, list[float]] = {}
-    wall: list[float] = []
-    for index in range(warm_up + repeats):
+    times: list[dict[str, list[float]]] = [{} for _ in renderers]
+    wall: list[list[float]] = [[] for _ in renderers]
+    for index in range((warm_up + repeats) * len(renderers)):
+        which = index % len(renderers)
+        renderer = renderers[which]
         ctx.finish()
         start = time.perf_counter()
         renderer.render(shot)
@@ -166,11 +185,13 @@ def measure_passes(
         figures = renderer.timings()
         if renderer.timing_source == "wall clock":
             figures.pop("cpu", None)  # it would contain the passes
-        if index >= warm_up:
-            wall.append(elapsed)
+        if index >= warm_up * len(renderers):
+            wall[which].append(elapsed)
             for key, value in figures.items():
-                times.setdefault(key, []).append(value)
+                times[which].setdefault(key, []).append(value)
         if steps is not None:
             steps.done(before + index + 1)
-    passes = {key: Quartiles.of(values) for key, values in times.items()}
-    return passes, Quartiles.of(wall)
+    return [
+        ({key: Quartiles.of(values) for key, values in passes.items()}, Quartiles.of(frames))
+        for passes, frames in zip(times, wall, strict=True)
+    ]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from app.errors import InputError
 from app.render import gbuffer
+from app.render.everything import everything_on
 from app.render.features import LightingFeatures, Limits
 from app.render.gbuffer import objects_spec
 from app.render.light_shapes import curve_texels, has_triangles
@@ -57,8 +58,11 @@ def needs_of(
     limits: Limits,
     technique: str = DEFAULT_TECHNIQUE,
     view: PixelView = "radiance",
+    everything: bool = False,
 ) -> Needs:
     """Return what a scene needs with ``samples`` per pixel.
+
+    With ``everything`` nothing is left out (`app.render.everything`).
 
     Raises
     ------
@@ -66,6 +70,8 @@ def needs_of(
         If lights or objects are more than the machine can hold.
     """
     lighting = LightingFeatures.of(scene, samples, limits, technique, view)
+    if everything:
+        lighting = everything_on(lighting)
     outlines = curve_texels(scene.lights)
     if outlines > limits.storage_texels:
         raise InputError(
@@ -76,11 +82,11 @@ def needs_of(
     attachments: list[str] = []
     if lighting.lit:
         attachments += ["gbuffer", *(["tangents"] if lighting.tangents else []), "depth"]
-        if scene.objects:
+        if everything or scene.objects:
             programs.append(objects_spec(lighting.tangents))
-        if has_triangles(scene.lights):
+        if everything or has_triangles(scene.lights):
             programs.append(gbuffer.LIGHTS)
-        if outlines:
+        if everything or outlines:
             programs.append(gbuffer.CURVED_LIGHTS)
         programs.append(lighting_spec(lighting))
     attachments.append("radiance")

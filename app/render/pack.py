@@ -211,14 +211,17 @@ def edges_of(loops: Sequence[FloatArray]) -> FloatArray:
     )
 
 
-def pack_lights(lights: Sequence[AreaLight], curves: CurveForm = "tree") -> NDArray[np.float32]:
+def pack_lights(
+    lights: Sequence[AreaLight], curves: CurveForm | None = None
+) -> NDArray[np.float32]:
     """Return (n, 4) float32 texels: all headers, then all edges, or all nodes.
 
     If one light has curves (`has_curves`) every light's outline becomes a tree, so
     that one walk serves all, unless ``curves`` says otherwise. A light without
     radiance keeps its header and gets no outline: nothing to integrate.
     """
-    packed = [_packed_light(light, curves if has_curves(lights) else 1) for light in lights]
+    form: CurveForm = ("tree" if has_curves(lights) else 1) if curves is None else curves
+    packed = [_packed_light(light, form) for light in lights]
     header = np.concatenate([np.zeros(0, LIGHT_HEADER), *(record for record, _ in packed)])
     counts = np.array([len(parts) for _, parts in packed], dtype=np.int64)
     before = np.cumsum(counts) - counts

@@ -141,7 +141,7 @@ class Plan:
         return "\n".join(lines) + "\n"
 
 
-def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path]) -> Plan:
+def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path], everything: bool = False) -> Plan:
     """Return the plan of a shot.
 
     Parameters
@@ -150,6 +150,8 @@ def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path]) -> Plan:
         Of the machine, or the defaults, which every OpenGL 4.1 machine has.
     roots : sequence of Path
         Folders of shaders, see `app.render.programs.shader_roots`.
+    everything : bool
+        Plan with nothing left out (`app.render.everything`).
 
     Raises
     ------
@@ -160,7 +162,7 @@ def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path]) -> Plan:
     """
     scene, settings = shot.scene, shot.settings
     technique = technique_of(scene, settings.technique)
-    needs = needs_of(scene, settings.samples, limits, technique, settings.view)
+    needs = needs_of(scene, settings.samples, limits, technique, settings.view, everything)
     features = needs.lighting
     pixels = shot.width * shot.height
     samples = "1 sample" if settings.samples == 1 else f"{settings.samples} samples"

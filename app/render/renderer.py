@@ -156,6 +156,8 @@ class Renderer:
     ----------
     ctx : moderngl.Context
         OpenGL 4.1 or later; must be current whenever a method is called.
+    everything : bool
+        Leave nothing out, to measure what that costs (`app.render.everything`).
 
     Notes
     -----
@@ -164,8 +166,9 @@ class Renderer:
     `ShaderError` (a changed shader does not compile).
     """
 
-    def __init__(self, ctx: moderngl.Context) -> None:
+    def __init__(self, ctx: moderngl.Context, everything: bool = False) -> None:
         self.ctx = ctx
+        self.everything = everything
         self.limits = Limits.of(ctx)
         self.programs = Programs(ctx)
         self.lighting_passes = 0
@@ -475,7 +478,7 @@ class Renderer:
 
     def plan(self, shot: Shot) -> Plan:
         """Return what rendering ``shot`` compiles, allocates and loads, and why."""
-        return make_plan(shot, self.limits, self.programs.roots)
+        return make_plan(shot, self.limits, self.programs.roots, self.everything)
 
     def allocated(self) -> dict[str, int]:
         """Return the bytes of every buffer, table and attachment held now, by name."""
@@ -560,6 +563,8 @@ class Renderer:
             self._held_materials = None
         self._targets.resize((shot.width, shot.height))
         self._targets.keep_only({name for name, _ in needs.attachments} - {"depth"})
+        if needs.accumulates:
+            self._targets.texture("radiance 2")
         self._needs = needs
         self._seen = _Seen(shot)
         self._stale = False
@@ -581,7 +586,7 @@ class Renderer:
             same = same and lighting.counts == (view == "cost")
             if same and lighting.accumulates == (samples > 1):
                 return self._needs
-        return needs_of(scene, samples, self.limits, technique, view)
+        return needs_of(scene, samples, self.limits, technique, view, self.everything)
 
     def _add_sample(self) -> None:
         assert self._seen is not None

@@ -14,7 +14,12 @@ def storage_bytes(texels: int, uniform_texels: int) -> int:
     """Return the bytes that `TexelStorage` takes for ``texels`` records."""
     if uniform_texels:
         return 16 * uniform_texels
-    return 16 * STORAGE_TEXTURE_WIDTH * -(-texels // STORAGE_TEXTURE_WIDTH)
+    return 16 * STORAGE_TEXTURE_WIDTH * _rows(texels)
+
+
+def _rows(texels: int) -> int:
+    """Return the rows of a texture that holds so many texels; even none needs one."""
+    return max(1, -(-texels // STORAGE_TEXTURE_WIDTH))
 
 
 class TexelStorage:
@@ -33,7 +38,7 @@ class TexelStorage:
         if uniform_texels:
             filled = np.zeros((uniform_texels, 4), dtype=np.float32)
         else:
-            rows = -(-len(texels) // STORAGE_TEXTURE_WIDTH)
+            rows = _rows(len(texels))
             filled = np.zeros((rows * STORAGE_TEXTURE_WIDTH, 4), dtype=np.float32)
         filled[: len(texels)] = texels
         if self.bytes != filled.nbytes or (self._buffer is None) == bool(uniform_texels):

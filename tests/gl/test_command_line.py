@@ -146,6 +146,21 @@ def test_bench(folder: Path) -> None:
             assert 0.0 <= times["q1"] <= times["median"] <= times["q3"]
 
 
+def test_everything_costs_more(folder: Path) -> None:
+    command(
+        folder, "bench", "lit.json", "--size", "32x24", "--repeats", "1", "--warm-up", "0",
+        "--everything", "--json", "times.json",
+    )  # fmt: skip
+    rows = json.loads((folder / "times.json").read_text())["rows"]
+    assert [row["everything"] for row in rows] == [False, True, False, True]
+    assert all(a["bytes"] < b["bytes"] for a, b in zip(rows[::2], rows[1::2], strict=True))
+    text = command(folder, "explain", "lit.json", "--samples", "1", "--everything").stdout
+    for part in ("needed", "everything", "radiance 2", "characters", "Allocated"):
+        assert part in text
+    plan = json.loads(command(folder, "explain", "lit.json", "--everything", "--json").stdout)
+    assert plan["bytes"] < plan["everything"]["bytes"]
+
+
 def test_bench_compares_with_the_exact_integral(folder: Path) -> None:
     """Per alpha and technique: the fitted lobe's for all but ggx, which has GGX itself."""
     curved = json.loads((folder / "lit.json").read_text())
