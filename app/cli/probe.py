@@ -90,7 +90,10 @@ def probe(
         for start in range(0, count, BATCH):
             part = slice(start, start + BATCH)
             found = renderer.probe(
-                wanted, settings, **{name: array[part] for name, array in arrays.items()}
+                wanted,
+                settings,
+                anisotropic=anisotropic > 0,
+                **{name: array[part] for name, array in arrays.items()},
             )
             specular[part], diffuse[part] = found["specular"], found["diffuse"]
             steps.done(min(start + BATCH, count))

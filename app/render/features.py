@@ -27,6 +27,7 @@ from app.render.pack import (
     light_geometry,
     part_count,
 )
+from app.render.tables import anisotropic_azimuths
 from app.render.techniques import DEFAULT_TECHNIQUE, find_technique, parse_technique
 from app.scene import AreaLight, PixelView, Scene
 
@@ -223,7 +224,7 @@ class LightingFeatures:
 
     @property
     def reads_tables(self) -> bool:
-        """Whether the technique's tables are looked up."""
+        """Whether the technique's tables are looked up: the anisotropic ones with ``tangents``."""
         return self.specular and find_technique(self.technique).has_tables
 
     @property
@@ -249,22 +250,29 @@ class LightingFeatures:
             "PROBES": 0,
             "COUNTS_EVALUATIONS": int(self.counts),
             "HAS_TANGENTS": int(self.tangents),
-            **technique_defines(self.technique),
+            **technique_defines(self.technique, self.tangents),
             "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
             "MATERIAL_TEXELS": self.uniform_materials,
             **lights.defines(),
         }
 
 
-def technique_defines(technique: str) -> dict[str, int]:
-    """Return the numbers that choose a technique's shaders."""
+def technique_defines(technique: str, tangents: bool) -> dict[str, int]:
+    """Return the numbers that choose a technique's shaders, for surfaces with or without tangents.
+
+    What looks lobes up takes no tangent where none matters: it has an isotropic table.
+    """
     choice = parse_technique(technique)
+    has_tables = choice.technique.has_tables
+    takes_tangent = choice.technique.anisotropic and (tangents or not has_tables)
+    azimuths = anisotropic_azimuths() if has_tables and takes_tangent else (0, 0)
     defines = {
         "TECHNIQUE_GGX": int(choice.name == "ggx"),
         "TECHNIQUE_REFERENCE": int(choice.name == "reference"),
         "TECHNIQUE_REPRESENTATIVE_POINT": int(choice.name == "representative-point"),
-        "TAKES_TANGENT": int(choice.technique.anisotropic),
-        "HAS_TABLES": int(choice.technique.has_tables),
+        "TAKES_TANGENT": int(takes_tangent),
+        "RESIDUAL_AZIMUTHS": azimuths[0],
+        "ALBEDO_AZIMUTHS": azimuths[1],
         "CURVE_RULE": choice.technique.curve_rule,
         "CURVE_NODES": choice.curve_nodes,
     }
@@ -273,13 +281,16 @@ def technique_defines(technique: str) -> dict[str, int]:
     return defines
 
 
-def probe_defines(lights: LightNeeds, technique: str) -> dict[str, int]:
-    """Return the numbers that the probe's shaders are assembled with: a white, glossy material."""
+def probe_defines(lights: LightNeeds, technique: str, anisotropic: bool) -> dict[str, int]:
+    """Return the numbers that the probe's shaders are assembled with: a white, glossy material.
+
+    ``anisotropic``: whether that of some point is.
+    """
     return {
         "HAS_SPECULAR": 1,
         "HAS_DIFFUSE": 1,
         "PROBES": 1,
         "COUNTS_EVALUATIONS": 0,
-        **technique_defines(lights.technique(technique)),
+        **technique_defines(lights.technique(technique), anisotropic),
         **lights.defines(),
     }

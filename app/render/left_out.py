@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from app.render.features import LightingFeatures
 from app.render.light_shapes import curve_texels, has_triangles
 from app.render.needs import FORMAT_BYTES
-from app.render.tables import isotropic_textures
+from app.render.tables import table_textures
 from app.scene import TONE_MAPS, Shot
 
 
@@ -51,7 +51,7 @@ def left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
             why = f"technique {features.technique} needs none"
         else:
             why = f"{dark or 'every material has f0 = 0'}, so nothing looks them up"
-        tables = sum(int(texels.nbytes) for texels in isotropic_textures())
+        tables = sum(int(texels.nbytes) for texels in table_textures(features.tangents).values())
         leave("tables of the technique", why, tables)
     if not features.diffuse:
         leave("diffuse shading", dark or "every material has diffuse = 0")

@@ -19,14 +19,15 @@ from app.render.pack import pack_lights, pack_materials
 from app.render.programs import Programs, ProgramSpec, set_uniform
 from app.render.state import FullScreenTriangle, begin_pass, release_framebuffer
 from app.render.storage import TexelStorage
-from app.render.tables import isotropic_textures
+from app.render.tables import table_textures
 from app.scene import AreaLight, Material
 
 # Texture units and uniform block bindings; each pass binds its own anew.
-SURFACES, TANGENTS, HISTORY, LIGHTS, MATERIALS, TABLE_RESIDUAL, TABLE_ALBEDO = range(7)
+SURFACES, TANGENTS, HISTORY, LIGHTS, MATERIALS, FIRST_TABLE = range(6)
 
 POINT_INPUTS = ("positions", "normals", "tangents", "views", "alphas")
 FIRST_POINT_UNIT = 8
+"""Behind the units of the tables."""
 
 PROBE_SIDE = 1024
 """Points are probed in pictures of at most this side."""
@@ -39,10 +40,13 @@ def lighting_spec(features: LightingFeatures) -> ProgramSpec:
     )
 
 
-def probe_spec(lights: LightNeeds, technique: str) -> ProgramSpec:
-    """Return the probe's program for a scene's lights and a technique."""
+def probe_spec(lights: LightNeeds, technique: str, anisotropic: bool) -> ProgramSpec:
+    """Return the probe's program for a scene's lights, a technique and points."""
     return ProgramSpec.of(
-        "probe", "passes/fullscreen.vert", "passes/probe.frag", probe_defines(lights, technique)
+        "probe",
+        "passes/fullscreen.vert",
+        "passes/probe.frag",
+        probe_defines(lights, technique, anisotropic),
     )
 
 
@@ -54,7 +58,7 @@ class LightingPass:
         self._programs = programs
         self._lights = TexelStorage(ctx, "light", "Lights")
         self._materials = TexelStorage(ctx, "material", "Materials")
-        self._tables: dict[str, moderngl.Texture] = {}
+        self._tables: dict[str, moderngl.Texture | moderngl.TextureArray] = {}
         self._triangle = FullScreenTriangle(ctx)
         self._light_count = 0
 
@@ -83,16 +87,23 @@ class LightingPass:
                 texture.release()
             self._tables.clear()
 
-    def load_tables(self) -> None:
-        """Hold the technique's tables."""
-        if self._tables:
+    def load_tables(self, anisotropic: bool) -> None:
+        """Hold the technique's tables, of isotropic lobes or of all, and no others."""
+        wanted = table_textures(anisotropic)
+        if self._tables.keys() == wanted.keys():
             return
-        for name, texels in zip(
-            ("table_residual", "table_albedo"), isotropic_textures(), strict=True
-        ):
-            height, width, channels = texels.shape
-            texture = self._ctx.texture((width, height), channels, texels.tobytes(), dtype="f4")
-            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.drop(tables=True)
+        for name, texels in wanted.items():
+            texture: moderngl.Texture | moderngl.TextureArray
+            *layers, height, width, channels = texels.shape
+            if layers:
+                size = (width, height, layers[0])
+                texture = self._ctx.texture_array(size, channels, texels.tobytes(), dtype="f2")
+                texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+                texture.repeat_x = texture.repeat_y = False
+            else:
+                texture = self._ctx.texture((width, height), channels, texels.tobytes(), dtype="f4")
+                texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self._tables[name] = texture
 
     def draw(
@@ -147,6 +158,7 @@ class LightingPass:
         self,
         needs: LightNeeds,
         technique: str,
+        anisotropic: bool,
         position: NDArray[np.float32],
         normal: NDArray[np.float32],
         tangent: NDArray[np.float32],
@@ -158,7 +170,7 @@ class LightingPass:
 
         They are the mean of ``samples`` estimates, of a technique that samples.
         """
-        program = self._programs.get(probe_spec(needs, technique))
+        program = self._programs.get(probe_spec(needs, technique, anisotropic))
         batch = PROBE_SIDE * PROBE_SIDE
         pieces = [
             self._probe_batch(program, [a[start : start + batch] for a in inputs], samples)
@@ -209,10 +221,10 @@ class LightingPass:
     def _bind_shading(self, program: moderngl.Program) -> None:
         set_uniform(program, "light_count", self._light_count)
         self._lights.bind(program, LIGHTS)
-        for unit, name in ((TABLE_RESIDUAL, "table_residual"), (TABLE_ALBEDO, "table_albedo")):
+        for unit, (name, texture) in enumerate(self._tables.items(), start=FIRST_TABLE):
             if name in program:
                 set_uniform(program, name, unit)
-                self._tables[name].use(unit)
+                texture.use(unit)
 
     def allocated(self) -> dict[str, int]:
         """Return the bytes of every buffer and table held, by name."""
@@ -221,8 +233,9 @@ class LightingPass:
             for name, storage in (("lights", self._lights), ("materials", self._materials))
             if storage.bytes
         }
-        for name, texture in self._tables.items():
-            held[name] = 4 * texture.components * texture.width * texture.height
+        for name, texels in table_textures("table_residual_2" in self._tables).items():
+            if name in self._tables:
+                held[name] = int(texels.nbytes)
         return held
 
     def release(self) -> None:

@@ -27,7 +27,7 @@ from app.render.post import display_spec
 from app.render.programs import ProgramSpec
 from app.render.reasons import counted, program_reason, resource_reason
 from app.render.storage import storage_bytes
-from app.render.tables import isotropic_textures
+from app.render.tables import table_textures
 from app.render.techniques import find_technique, technique_of
 from app.scene import Scene, Shot
 
@@ -205,12 +205,9 @@ def _tables(features: LightingFeatures) -> Iterator[tuple[str, str, int]]:
     """Yield name, form and bytes of each table."""
     if not features.reads_tables:
         return
-    for name, texels in zip(("table_residual", "table_albedo"), isotropic_textures(), strict=True):
-        yield (
-            name,
-            f"float32 texture, {' x '.join(str(n) for n in texels.shape)}",
-            int(texels.nbytes),
-        )
+    for name, texels in table_textures(features.tangents).items():
+        form = f"{texels.dtype} texture, {' x '.join(str(n) for n in texels.shape)}"
+        yield name, form, int(texels.nbytes)
 
 
 def _buffers(scene: Scene, features: LightingFeatures) -> Iterator[tuple[str, str, int]]:

@@ -390,6 +390,7 @@ class Renderer:
         tangent: ArrayLike,
         view: ArrayLike,
         alpha: ArrayLike,
+        anisotropic: bool | None = None,
     ) -> dict[str, NDArray[np.float32]]:
         """Return what points of a white material send to their viewers, by lobe.
 
@@ -399,6 +400,9 @@ class Renderer:
             World space; ``normal`` and ``view`` (to the viewer) unit.
         alpha : (n, 2) float
             GGX parameters along tangent and bitangent.
+        anisotropic : bool, optional
+            Whether lobes are looked up in the anisotropic table; by default where some
+            point's alphas differ.
 
         Returns
         -------
@@ -429,16 +433,21 @@ class Renderer:
             if len(array) != count:
                 raise ValueError(f"{name} has {len(array)} rows, expected {count} as in position")
         alphas = arrays["alpha"]
-        technique = suited_technique(settings.technique, bool(np.any(alphas[:, 0] != alphas[:, 1])))
+        if anisotropic is None:
+            anisotropic = bool(np.any(alphas[:, 0] != alphas[:, 1]))
+        technique = suited_technique(settings.technique, anisotropic)
+        anisotropic = anisotropic and find_technique(technique).anisotropic
         needs = LightNeeds.of(scene.lights, self.limits, technique)
         if not (needs.one_sided or needs.two_sided) or not count:
             zero = np.zeros((count, 3), dtype=np.float32)
             return {"specular": zero, "diffuse": zero.copy()}
         self._hold_lights(scene, needs)
         if find_technique(technique).has_tables:
-            self._lighting.load_tables()
+            self._lighting.load_tables(anisotropic)
         samples = settings.samples if find_technique(technique).is_sampled else 1
-        specular, diffuse = self._lighting.probe(needs, technique, **arrays, samples=samples)
+        specular, diffuse = self._lighting.probe(
+            needs, technique, anisotropic, **arrays, samples=samples
+        )
         return {"specular": specular, "diffuse": diffuse}
 
     def timings(self, *, wait: bool = True) -> dict[str, float]:
@@ -548,7 +557,7 @@ class Renderer:
         if features.shades:
             self._hold_materials(scene, features.uniform_materials)
         if features.reads_tables:
-            self._lighting.load_tables()
+            self._lighting.load_tables(features.tangents)
         self._lighting.drop(
             lights=not features.lit,
             materials=not features.shades,

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ltc.anisotropic import AnisotropicTable, load_anisotropic
 from ltc.table import load_isotropic
 
 Texels = NDArray[np.float32]
@@ -25,3 +28,40 @@ def isotropic_textures() -> tuple[Texels, Texels]:
         If the table is missing from the installation, or damaged.
     """
     return load_isotropic().textures()
+
+
+@lru_cache(maxsize=1)
+def _anisotropic() -> AnisotropicTable:
+    return load_anisotropic()
+
+
+@lru_cache(maxsize=1)
+def anisotropic_textures() -> tuple[NDArray[np.float16], NDArray[np.float16], NDArray[np.float16]]:
+    """Return the three array textures (layers: azimuth and ratio, rows: view, columns: alpha).
+
+    Channels as ``shaders/ltc/anisotropic.glsl`` reads them: `AnisotropicTable.textures`.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If the table is missing from the installation, or damaged.
+    """
+    return _anisotropic().textures()
+
+
+def table_textures(anisotropic: bool) -> Mapping[str, NDArray[Any]]:
+    """Return the textures that lobes are looked up in, by the names of the samplers.
+
+    Shapes are (rows, columns, channels) float32, or (layers, rows, columns, channels) float16 of
+    the anisotropic table. Raises as `isotropic_textures` and `anisotropic_textures`.
+    """
+    if anisotropic:
+        names = ("table_residual", "table_residual_2", "table_albedo")
+        return dict(zip(names, anisotropic_textures(), strict=True))
+    return dict(zip(("table_residual", "table_albedo"), isotropic_textures(), strict=True))
+
+
+def anisotropic_azimuths() -> tuple[int, int]:
+    """Return how many azimuths the residual's and the albedo's layers stand for."""
+    table = _anisotropic()
+    return table.residual.shape[0], table.albedo.shape[0]

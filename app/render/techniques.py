@@ -38,7 +38,8 @@ class Technique:
     anisotropic : bool
         Whether it shades alpha_x apart from alpha_y, and so reads tangents.
     has_tables : bool
-        Whether its specular part looks up the tables of `app.render.tables`.
+        Whether its specular part looks up the tables of `app.render.tables`: the isotropic one
+        where nothing is anisotropic, for which it then takes no tangent.
     is_sampled : bool
         Whether a sample of a pixel is a random estimate that others must be averaged with,
         rather than the result.
@@ -66,9 +67,9 @@ class Technique:
 
 TECHNIQUES: dict[str, Technique] = {
     "ltc": Technique(
-        "linearly transformed cosines: a fitted GGX lobe integrated along the outline, Lambert "
-        "diffuse",
-        anisotropic=False,
+        "linearly transformed cosines: a fitted GGX lobe, isotropic or anisotropic, integrated "
+        "along the outline, Lambert diffuse",
+        anisotropic=True,
         has_tables=True,
         parameter=Parameter("quadrature nodes a panel of a curve", 2, 6, 4),
     ),
@@ -82,21 +83,21 @@ TECHNIQUES: dict[str, Technique] = {
     "adaptive": Technique(
         "ltc with curves halved until triangles between chords add little, as published by Kuge "
         "et al. 2022",
-        anisotropic=False,
+        anisotropic=True,
         has_tables=True,
         curves="whole",
         curve_rule=1,
     ),
     "adaptive-extrapolated": Technique(
         "adaptive with the same chords, extrapolated to the curve",
-        anisotropic=False,
+        anisotropic=True,
         has_tables=True,
         curves="whole",
         curve_rule=2,
     ),
     "uniform": Technique(
         "ltc with every curve cut into the same number of edges",
-        anisotropic=False,
+        anisotropic=True,
         has_tables=True,
         curves="edges",
         parameter=Parameter("edges a curve", 1, 4096, 18),

@@ -4,41 +4,58 @@
 #include "common/frame.glsl"
 #include "common/light_data.glsl"
 #include "common/material.glsl"
+#include "common/tangent_frame.glsl"
 #include "ltc/contour.glsl"
-#if HAS_SPECULAR
-#include "ltc/lobe.glsl"
-#include "ltc/table.glsl"
-#endif
 
+// A point to be shaded. Where the tables tell alpha_x from alpha_y (TAKES_TANGENT) x is the
+// tangent, else along the view.
 struct SurfacePoint {
-    vec3 position;   // world [m]
-    ViewFrame frame;
-    float alpha;
+    vec3 position;            // world [m]
+    mat3 world_from_shading;  // columns x, y and z, the normal
+    vec3 wo;                  // to the viewer, in these, z >= 0
+    vec2 alpha;
 };
+
+struct SpecularLobe {
+    CosineTransform transform;
+    vec2 albedo;  // (A, B) / share above the surface: f0 (A - B) + B is the reflectance
+};
+
+#if HAS_SPECULAR
+// By the pass that has the tables, see passes/table_storage.glsl.
+SpecularLobe specular_lobe(SurfacePoint point);
+#endif
 
 SurfacePoint surface_point(vec3 position, vec3 normal, vec3 wo, vec2 alpha)
 {
-    SurfacePoint point;
-    point.position = position;
-    point.frame = view_aligned_frame(normal, wo);
-    // This table is isotropic: of a stretched lobe it keeps the area.
-    point.alpha = alpha.x == alpha.y ? alpha.x : sqrt(alpha.x * alpha.y);
-    return point;
+    ViewFrame frame = view_aligned_frame(normal, wo);
+    return SurfacePoint(
+        position, frame.world_from_shading, vec3(frame.sin_theta, 0.0, frame.cos_theta), alpha);
 }
+
+#if TAKES_TANGENT
+// Views below the surface count as grazing.
+SurfacePoint surface_point(vec3 position, vec3 normal, vec3 tangent, vec3 wo, vec2 alpha)
+{
+    mat3 world_from_tangent = tangent_frame(normal, tangent);
+    vec3 local = wo * world_from_tangent;
+    local.z = max(local.z, 1e-6);
+    return SurfacePoint(position, world_from_tangent, normalize(local), alpha);
+}
+#endif
 
 // Specular and diffuse form factors of a light at a point; both zero where it
 // shows its dark side.
 vec2 form_factors_at(PlanarLight light, SurfacePoint point, CosineTransform specular)
 {
-    mat3 world_from_shading = point.frame.world_from_shading;
-    vec3 normal = world_from_shading[2];
+    vec3 normal = point.world_from_shading[2];
     PlaneView view = plane_view(light, point.position);
     if (is_unseen(light, view, normal)) {
         return vec2(0.0);
     }
     vec2 factors = vec2(0.0);
 #if HAS_DIFFUSE
-    mat3 shading_from_world = transpose(world_from_shading);
+    mat3 shading_from_world = transpose(point.world_from_shading);
     CosineTransform diffuse = CosineTransform(shading_from_world, shading_from_world);
 #endif
 #if HAS_CURVES && HAS_SPECULAR && HAS_DIFFUSE && !CURVE_RULE
@@ -46,7 +63,7 @@ vec2 form_factors_at(PlanarLight light, SurfacePoint point, CosineTransform spec
 #else
 #if HAS_SPECULAR
 #if CURVE_RULE
-    least_triangle = specular_triangle(point.alpha);
+    least_triangle = specular_triangle(sqrt(point.alpha.x * point.alpha.y));
 #endif
     factors.x = light_form_factor(light, specular, view, normal);
 #endif
@@ -60,40 +77,24 @@ vec2 form_factors_at(PlanarLight light, SurfacePoint point, CosineTransform spec
     return clamp(light_winding(view) * factors, 0.0, 1.0);
 }
 
-#if HAS_SPECULAR
-struct SpecularLobe {
-    CosineTransform transform;
-    vec2 albedo;  // (A, B) / share above the surface: f0 (A - B) + B is the reflectance
-};
-
-SpecularLobe specular_lobe(sampler2D table_residual, sampler2D table_albedo, SurfacePoint point)
-{
-    float alpha = point.alpha;
-    float sin_theta = point.frame.sin_theta;
-    float cos_theta = point.frame.cos_theta;
-    vec2 coordinates = table_coordinates(alpha, cos_theta);
-    IsotropicLobe lobe = isotropic_lobe(
-        alpha, sin_theta, cos_theta, table_bilinear(table_residual, coordinates));
-    SpecularLobe result;
-    result.transform = cosine_transform(lobe, point.frame.world_from_shading);
-    vec2 stored = table_bilinear(table_albedo, coordinates).rg;
-    result.albedo = albedo_terms(stored, alpha, sin_theta, cos_theta) / lobe.above;
-    return result;
-}
-#endif
-
-// Radiance towards wo. `normal` and `wo` are unit and leave the surface.
+// Radiance towards wo. `normal`, `tangent` and `wo` are unit and leave the surface; alpha.x
+// acts along the tangent.
 vec3 shade_lights(
-#if HAS_SPECULAR
-    sampler2D table_residual, sampler2D table_albedo,
+    int light_count, vec3 position, vec3 normal,
+#if TAKES_TANGENT
+    vec3 tangent,
 #endif
-    int light_count, vec3 position, vec3 normal, vec3 wo, MaterialSample material)
+    vec3 wo, MaterialSample material)
 {
+#if TAKES_TANGENT
+    SurfacePoint point = surface_point(position, normal, tangent, wo, material.alpha);
+#else
     SurfacePoint point = surface_point(position, normal, wo, material.alpha);
+#endif
     CosineTransform specular = CosineTransform(mat3(0.0), mat3(0.0));
     vec3 reflectance = vec3(0.0);
 #if HAS_SPECULAR
-    SpecularLobe lobe = specular_lobe(table_residual, table_albedo, point);
+    SpecularLobe lobe = specular_lobe(point);
     specular = lobe.transform;
     // f0 = 0 means no specular lobe at all, as in scenes that leave it out.
     float has_lobe = material.f0 == vec3(0.0) ? 0.0 : 1.0;
@@ -111,12 +112,18 @@ vec3 shade_lights(
 #if PROBES
 // The two parts apart, for a white material: F = 1 and albedo 1.
 void probe_lights(
-    sampler2D table_residual, sampler2D table_albedo,
-    int light_count, vec3 position, vec3 normal, vec3 wo, vec2 alpha,
-    out vec3 specular, out vec3 diffuse)
+    int light_count, vec3 position, vec3 normal,
+#if TAKES_TANGENT
+    vec3 tangent,
+#endif
+    vec3 wo, vec2 alpha, out vec3 specular, out vec3 diffuse)
 {
+#if TAKES_TANGENT
+    SurfacePoint point = surface_point(position, normal, tangent, wo, alpha);
+#else
     SurfacePoint point = surface_point(position, normal, wo, alpha);
-    SpecularLobe lobe = specular_lobe(table_residual, table_albedo, point);
+#endif
+    SpecularLobe lobe = specular_lobe(point);
     specular = vec3(0.0);
     diffuse = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {

@@ -26,9 +26,8 @@ vec4 table_bilinear(sampler2D table, vec2 coordinates)
 
 // (A, B) from the stored (A, u), B = A (1 - q u)^5, q the length of the stretched
 // view: the reflectance of Schlick's f0 is f0 (A - B) + B.
-vec2 albedo_terms(vec2 stored, float alpha, float sin_theta, float cos_theta)
+vec2 albedo_terms(vec2 stored, float q)
 {
-    float q = length(vec2(alpha * sin_theta, cos_theta));
     float t = 1.0 - min(q * stored.y, 1.0);
     float t2 = t * t;
     return stored.x * vec2(1.0, t2 * t2 * t);

@@ -16,6 +16,9 @@
 #include "representative_point/shade.glsl"
 #else
 #include "ltc/shade.glsl"
+#if HAS_SPECULAR
+#include "passes/table_storage.glsl"
+#endif
 #endif
 #endif
 
@@ -35,10 +38,6 @@ uniform vec3 ray_dy;
 uniform int light_count;
 #if TECHNIQUE_REFERENCE
 uniform uint sample_index;
-#endif
-#if HAS_SPECULAR && HAS_TABLES
-uniform sampler2D table_residual;
-uniform sampler2D table_albedo;
 #endif
 #if HAS_TANGENTS
 uniform sampler2D tangents;
@@ -85,11 +84,7 @@ vec3 surface_radiance(vec4 surface)
 #endif
         light_count, position, normal, tangent, wo, material);
 #else
-    return shade_lights(
-#if HAS_SPECULAR
-        table_residual, table_albedo,
-#endif
-        light_count, position, normal, wo, material);
+    return shade_lights(light_count, position, normal, wo, material);
 #endif
 }
 #endif

@@ -8,7 +8,7 @@
 #elif TECHNIQUE_REPRESENTATIVE_POINT
 #include "representative_point/shade.glsl"
 #else
-#include "ltc/shade.glsl"
+#include "passes/table_storage.glsl"
 #endif
 
 uniform sampler2D positions;  // world [m]
@@ -17,9 +17,6 @@ uniform sampler2D views;      // unit, to the viewer
 uniform sampler2D alphas;     // (alpha_x, alpha_y)
 #if TAKES_TANGENT
 uniform sampler2D tangents;   // unit, perpendicular to the normal
-#else
-uniform sampler2D table_residual;
-uniform sampler2D table_albedo;
 #endif
 uniform int light_count;
 #if TECHNIQUE_REFERENCE
@@ -47,8 +44,7 @@ void main()
                  light_count, position, normal, tangent, wo, alpha,
                  specular_radiance, diffuse_radiance);
 #else
-    probe_lights(table_residual, table_albedo, light_count, position, normal, wo, alpha,
-                 specular_radiance, diffuse_radiance);
+    probe_lights(light_count, position, normal, wo, alpha, specular_radiance, diffuse_radiance);
 #endif
     specular = vec4(specular_radiance, 0.0);
     diffuse = vec4(diffuse_radiance, 0.0);

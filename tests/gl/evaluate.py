@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 import moderngl
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.render.assemble import assemble
 from ltc.resources import resource_path
+
+AnyTexture: TypeAlias = moderngl.Texture | moderngl.Texture3D | moderngl.TextureArray
 
 _WIDTH = 256
 _TYPES = {1: "float", 2: "vec2", 3: "vec3", 4: "vec4"}
@@ -32,6 +35,7 @@ def evaluate(
     features: Mapping[str, int] | None = None,
     tables: Mapping[str, NDArray[np.float32]] | None = None,
     prelude: str = "",
+    layers: Mapping[str, NDArray[np.float16]] | None = None,
 ) -> NDArray[np.float64]:
     """Return ``result``, a vec4 that ``body`` assigns, for every row of the inputs.
 
@@ -50,6 +54,8 @@ def evaluate(
         they are volumes.
     prelude : str
         Functions that the library only declares.
+    layers : mapping of str to (layers, rows, columns, channels) float16
+        Array textures with linear filtering.
 
     Returns
     -------
@@ -59,12 +65,14 @@ def evaluate(
     arrays = {k: v[:, None] if v.ndim == 1 else v for k, v in arrays.items()}
     count = len(next(iter(arrays.values())))
     rows = -(-count // _WIDTH)
+    layers = layers or {}
     samplers = [*arrays, *(tables or {})]
     lines = [f'#include "{name}"' for name in includes]
     for name in samplers:
         flat = name in arrays or (tables or {})[name].ndim == 3
         kind = "sampler2D" if flat else "sampler3D"
         lines.append(f"uniform {kind} {name}{'_in' if name in arrays else ''};")
+    lines += [f"uniform sampler2DArray {name};" for name in layers]
     lines += ["layout(location = 0) out vec4 result;", prelude, "void main()", "{"]
     lines += ["ivec2 place = ivec2(gl_FragCoord.xy);", "result = vec4(0.0);"]
     for name, value in arrays.items():
@@ -75,7 +83,7 @@ def evaluate(
     (folder / "evaluate.frag").write_text("\n".join(lines), encoding="utf-8")
     source = assemble("evaluate.frag", features or {}, [folder, resource_path("shaders")])
 
-    held: list[moderngl.Texture | moderngl.Texture3D | moderngl.Framebuffer | moderngl.Program] = []
+    held: list[AnyTexture | moderngl.Framebuffer | moderngl.Program] = []
     try:
         program = ctx.program(vertex_shader=_VERTEX, fragment_shader=source.text)
         held.append(program)
@@ -92,6 +100,11 @@ def evaluate(
             texture = make(tuple(size[::-1]), channels, table.tobytes(), dtype="f4")
             held.append(texture)
             unit = _bind(program, name, texture, unit)
+        for name, table in layers.items():
+            depth, height, width, channels = table.shape
+            array = ctx.texture_array((width, height, depth), channels, table.tobytes(), dtype="f2")
+            held.append(array)
+            unit = _bind(program, name, array, unit, moderngl.LINEAR)
         target = ctx.texture((_WIDTH, rows), 4, dtype="f4")
         framebuffer = ctx.framebuffer([target])
         held += [target, framebuffer]
@@ -111,11 +124,12 @@ def evaluate(
 def _bind(
     program: moderngl.Program,
     name: str,
-    texture: moderngl.Texture | moderngl.Texture3D,
+    texture: AnyTexture,
     unit: int,
+    filtering: int = moderngl.NEAREST,
 ) -> int:
     """Bind to the next unit if the program uses the sampler; return the next free unit."""
-    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    texture.filter = (filtering, filtering)
     if name not in program:
         return unit
     texture.use(unit)
