@@ -79,6 +79,7 @@ class Exact:
         self._scene: Scene | None = None
         self._inputs: dict[str, FloatArray] = {}
         self._truth: dict[Lobe, dict[str, FloatArray]] = {}
+        self._anisotropic = False
 
     def errors(self, shot: Shot, lobe: Lobe | None = None) -> dict[str, Errors]:
         """Return the errors of the shot that was rendered last; empty if it shows no surface.
@@ -96,7 +97,9 @@ class Exact:
             self._choose(scene)
         if not len(self._inputs["position"]):
             return {}
-        found = self._renderer.probe(scene, shot.settings, **self._inputs)
+        found = self._renderer.probe(
+            scene, shot.settings, anisotropic=self._anisotropic, **self._inputs
+        )
         truth = self._exact(scene, lobe or own_lobe(shot.settings.technique))
         return {name: Errors.of(found[name], truth[name]) for name in truth}
 
@@ -106,17 +109,20 @@ class Exact:
         rng = np.random.default_rng(0)
         count = min(self._points, len(seen.index))
         which = rng.choice(len(seen.index), count, replace=False)
-        materials = scene.object_materials()
-        # Without the mesh's own tangents there is but the isotropic lobe of the same area.
-        alphas = np.array([m.alpha[0] * m.alpha[1] for m in materials]) ** 0.5
-        alpha = alphas[seen.index[which]]
-        tangent = shading_frames(seen.normal[which], seen.view[which])[:, 0]
+        alphas = np.array([m.alpha for m in scene.object_materials()]).reshape(-1, 2)
+        self._anisotropic = seen.tangent is not None
+        if seen.tangent is not None:
+            tangent = seen.tangent[which]
+        else:
+            # Without the mesh's own tangents there is but the isotropic lobe of the same area.
+            alphas = np.sqrt(alphas.prod(axis=1, keepdims=True)) * np.ones(2)
+            tangent = shading_frames(seen.normal[which], seen.view[which])[:, 0]
         inputs = {
             "position": seen.position[which],
             "normal": seen.normal[which],
             "tangent": tangent,
             "view": seen.view[which],
-            "alpha": np.stack([alpha, alpha], axis=-1),
+            "alpha": alphas[seen.index[which]],
         }
         self._inputs = {
             name: array.astype(np.float32).astype(np.float64) for name, array in inputs.items()
@@ -128,10 +134,16 @@ class Exact:
                 array / np.linalg.norm(array, axis=1, keepdims=True)
                 for array in (self._inputs["normal"], self._inputs["view"])
             )
+            alpha = self._inputs["alpha"]
             specular, diffuse = exact_radiance(
-                scene.lights, self._inputs["position"], normal, view, self._inputs["alpha"][:, 0],
+                scene.lights,
+                self._inputs["position"],
+                normal,
+                view,
+                alpha if self._anisotropic else alpha[:, 0],
                 lobe,
-            )  # fmt: skip
+                self._inputs["tangent"] if self._anisotropic else None,
+            )
             self._truth[lobe] = {"specular": specular, "diffuse": diffuse}
         return self._truth[lobe]
 

@@ -146,6 +146,18 @@ def facing_normal(normal: FloatArray, wo: FloatArray) -> FloatArray:
     return np.asarray(bent / np.linalg.norm(bent, axis=-1, keepdims=True))
 
 
+def turned_tangent(tangent: FloatArray, normal: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return tangents as ``material_tangent`` of ``lighting.frag`` bends and turns them."""
+    x = tangent - normal * np.sum(normal * tangent, axis=-1, keepdims=True)
+    square = np.sum(x * x, axis=-1, keepdims=True)
+    axis = np.where(np.abs(normal[:, :1]) < 0.5, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    other = axis - normal * np.sum(normal * axis, axis=-1, keepdims=True)
+    x = np.where(square > 1e-8, x, other)
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    c, s = np.cos(rotation)[:, None], np.sin(rotation)[:, None]
+    return np.asarray(c * x + s * np.cross(normal, x))
+
+
 def _vec3(values: FloatArray) -> Vec3:
     x, y, z = values.tolist()
     return (x, y, z)

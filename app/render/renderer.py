@@ -23,7 +23,7 @@ from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
 from app.render.needs import ATTACHMENTS, FORMAT_BYTES, Needs, needs_of
 from app.render.pack import CurveForm
-from app.render.picking import Hit, Picker, direction_from_octahedral, facing_normal
+from app.render.picking import Hit, Picker, direction_from_octahedral, facing_normal, turned_tangent
 from app.render.plan import Plan, make_plan
 from app.render.post import DisplayPass
 from app.render.programs import Programs
@@ -40,13 +40,15 @@ class Surfaces:
 
     ``position``, ``normal`` and ``view``, (n, 3) float64, are as the lighting pass has
     them: world space, view and normal unit, the normal bent to face the viewer. ``index``,
-    (n,), counts the scene's objects.
+    (n,), counts the scene's objects. ``tangent``, (n, 3), is the material's, unit and
+    perpendicular to the normal; None where the technique shaded without.
     """
 
     position: NDArray[np.float64]
     normal: NDArray[np.float64]
     view: NDArray[np.float64]
     index: NDArray[np.int64]
+    tangent: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -374,12 +376,15 @@ class Renderer:
         x, y = (axis.astype(np.float64) + 0.5 for axis in (columns, rows))
         ray = frame.ray(x, y, (width, height))
         view = -ray / np.linalg.norm(ray, axis=-1, keepdims=True)
-        return Surfaces(
-            frame.eye + found[:, 2:3] * ray,
-            facing_normal(direction_from_octahedral(found[:, :2]), view),
-            view,
-            found[:, 3].astype(np.int64),
-        )
+        normal = facing_normal(direction_from_octahedral(found[:, :2]), view)
+        index = found[:, 3].astype(np.int64)
+        tangent = None
+        if self._needs.lighting.tangents:
+            raw = np.frombuffer(self._targets.texture("tangents").read(), dtype=np.float32)
+            along = raw.reshape(height, width, 2)[::-1][rows, columns].astype(np.float64)
+            rotations = np.array([m.rotation for m in shot.scene.object_materials()])
+            tangent = turned_tangent(direction_from_octahedral(along), normal, rotations[index])
+        return Surfaces(frame.eye + found[:, 2:3] * ray, normal, view, index, tangent)
 
     def probe(
         self,

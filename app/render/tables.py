@@ -31,7 +31,8 @@ def isotropic_textures() -> tuple[Texels, Texels]:
 
 
 @lru_cache(maxsize=1)
-def _anisotropic() -> AnisotropicTable:
+def anisotropic_table() -> AnisotropicTable:
+    """Return the table of `anisotropic_textures`, in the form that Python looks up; raises so."""
     return load_anisotropic()
 
 
@@ -46,7 +47,7 @@ def anisotropic_textures() -> tuple[NDArray[np.float16], NDArray[np.float16], ND
     FileNotFoundError, ValueError
         If the table is missing from the installation, or damaged.
     """
-    return _anisotropic().textures()
+    return anisotropic_table().textures()
 
 
 def table_textures(anisotropic: bool) -> Mapping[str, NDArray[Any]]:
@@ -63,5 +64,5 @@ def table_textures(anisotropic: bool) -> Mapping[str, NDArray[Any]]:
 
 def anisotropic_azimuths() -> tuple[int, int]:
     """Return how many azimuths the residual's and the albedo's layers stand for."""
-    table = _anisotropic()
+    table = anisotropic_table()
     return table.residual.shape[0], table.albedo.shape[0]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from app.outline import boundary
-from app.render.tables import isotropic_textures
+from app.render.tables import anisotropic_table, isotropic_textures
 from app.scene import AreaLight
 from ltc import curved_outline, transform
 from ltc.curved_reference import curve_specular_integral_batch
@@ -35,7 +35,16 @@ def shading_frames(normal: FloatArray, view: FloatArray) -> FloatArray:
     axis = np.where(np.abs(normal[:, :1]) < 0.5, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     degenerate = np.sum(x * x, axis=-1) < 1e-14
     x = np.where(degenerate[:, None], np.cross(normal, axis), x)
-    x /= np.sqrt(np.sum(x * x, axis=-1, keepdims=True))
+    return _frames(normal, x)
+
+
+def tangent_frames(normal: FloatArray, tangent: FloatArray) -> FloatArray:
+    """Return tangent_from_world, (n, 3, 3), of unit normals and tangents not along them."""
+    return _frames(normal, tangent - normal * np.sum(normal * tangent, axis=-1, keepdims=True))
+
+
+def _frames(normal: FloatArray, x: FloatArray) -> FloatArray:
+    x = x / np.sqrt(np.sum(x * x, axis=-1, keepdims=True))
     return np.stack([x, np.cross(normal, x), normal], axis=-2)
 
 
@@ -62,6 +71,7 @@ def exact_radiance(
     view: ArrayLike,
     alpha: ArrayLike,
     lobe: Lobe = "ltc",
+    tangent: ArrayLike | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return what points of a white material send to their viewers.
 
@@ -69,10 +79,12 @@ def exact_radiance(
     ----------
     position, normal, view : (n, 3) float
         World space, as for `app.render.renderer.Renderer.probe`; views above the surface.
-    alpha : (n,) float
-        GGX parameters.
+    alpha : (n,) or (n, 2) float
+        GGX parameters; (n, 2) with ``tangent``.
     lobe : {"ltc", "ggx"}
         The fitted lobe, or GGX itself.
+    tangent : (n, 3) float, optional
+        Along which the first alpha acts. With it the fitted lobe is that of the anisotropic table.
 
     Returns
     -------
@@ -84,12 +96,24 @@ def exact_radiance(
     specular, diffuse = np.zeros((2, len(p), 3))
     for start in range(0, len(p), BATCH):
         part = slice(start, start + BATCH)
-        frames = shading_frames(n[part], wo[part])
-        cosine = np.clip(np.sum(n[part] * wo[part], axis=-1), 0.0, 1.0)
-        matrix, albedo, _ = sample_textures(isotropic_textures(), a[part], cosine)
-        inverse = transform.invert(matrix)
-        gain = albedo / (1.0 - transform.leak(matrix))
+        if tangent is None:
+            frames = shading_frames(n[part], wo[part])
+            ax = ay = a[part]
+        else:
+            frames = tangent_frames(n[part], np.asarray(tangent, dtype=np.float64)[part])
+            ax, ay = a[part].T
         local = np.einsum("nij,nj->ni", frames, wo[part])
+        local[:, 2] = np.maximum(local[:, 2], 0.0)
+        if lobe == "ltc":
+            if tangent is None:
+                cosine = np.minimum(local[:, 2], 1.0)
+                matrix, albedo, _ = sample_textures(isotropic_textures(), ax, cosine)
+            else:
+                table = anisotropic_table()
+                matrix = table.matrix_of_view(ax, ay, local)
+                albedo, _ = table.albedo_terms_of_view(ax, ay, local)
+            inverse = transform.invert(matrix)
+            gain = albedo / (1.0 - transform.leak(matrix))
         for light in lights:
             if not any(light.radiance):
                 continue
@@ -100,7 +124,7 @@ def exact_radiance(
             if lobe == "ltc":
                 share = gain * curved_outline.ltc_form_factor(inverse, contours).value
             else:
-                share, _ = curve_specular_integral_batch(contours, local, a[part], a[part])
+                share, _ = curve_specular_integral_batch(contours, local, ax, ay)
             lambert = curved_outline.form_factor(contours).value
             specular[part] += np.maximum(sign * share, 0.0)[:, None] * light.radiance
             diffuse[part] += np.maximum(sign * lambert, 0.0)[:, None] * light.radiance
