@@ -251,8 +251,8 @@ def _with_materials(scene: Scene, **changes: Any) -> Scene:
 
 def _table(rows: list[Row], title: str) -> Table:
     table = Table(title=f"Milliseconds per frame: median (quartiles). {title}")
-    table.add_column("scene")
-    table.add_column("technique")
+    table.add_column("scene", no_wrap=True)
+    table.add_column("technique", no_wrap=True)
     has_alpha = any(row.alpha is not None for row in rows)
     if has_alpha:
         table.add_column("alpha", justify="right")

@@ -41,7 +41,7 @@ def shot(material: Material, technique: str = "auto", mesh: str = "disc") -> Sho
         (PLAIN, "ggx", False, False),
         (BRUSHED, "auto", False, True),
         (BRUSHED, "ggx", False, True),
-        (BRUSHED, "ltc", True, False),
+        (BRUSHED, "ltc", True, True),
         (MATT, "auto", False, False),
         (MATT, "ggx", False, False),
     ],
@@ -59,7 +59,10 @@ def test_only_what_is_needed(renderer, material, technique, tables, tangents):
     glossy = material is not MATT
     ggx = technique == "ggx" or (technique == "auto" and material.is_anisotropic)
     assert any(name.startswith("ggx/") for name in lighting.files) is (glossy and ggx)
-    assert ("ltc/lobe.glsl" in lighting.files) is (glossy and not ggx)
+    looked_up = "ltc/anisotropic.glsl" if tangents else "ltc/lobe.glsl"
+    other = "ltc/lobe.glsl" if tangents else "ltc/anisotropic.glsl"
+    assert (looked_up in lighting.files) is (glossy and not ggx)
+    assert other not in lighting.files
 
 
 def test_changing_the_technique_back_and_forth_leaves_nothing(renderer):
@@ -85,11 +88,22 @@ def test_techniques_agree_on_isotropic_surfaces(renderer):
     assert difference.max() <= 0.03
 
 
+def test_techniques_agree_on_brushed_surfaces(renderer):
+    pictures = []
+    for technique in ("ltc", "ggx"):
+        renderer.render(shot(BRUSHED, technique))
+        pictures.append(renderer.radiance())
+    difference = np.abs(pictures[0] - pictures[1]) / 3.0
+    assert difference.mean() <= 0.005
+    assert difference.max() <= 0.06
+
+
 @pytest.mark.parametrize("mesh", ["plane", "sphere", "disc", "box"])
 @pytest.mark.parametrize("alpha", [(1e-4, 1.0), (1.0, 1e-4), (0.05, 0.4)])
-def test_brushed_meshes_are_finite_everywhere(renderer, mesh, alpha):
+@pytest.mark.parametrize("technique", ["ggx", "ltc"])
+def test_brushed_meshes_are_finite_everywhere(renderer, technique, mesh, alpha):
     """Poles of the tangents, silhouettes and edges included."""
-    renderer.render(shot(replace(PLAIN, alpha=alpha), "ggx", mesh))
+    renderer.render(shot(replace(PLAIN, alpha=alpha), technique, mesh))
     radiance = renderer.radiance()
     assert np.all(np.isfinite(radiance))
     assert radiance.min() >= 0.0
