@@ -196,7 +196,16 @@ def clip_to_horizon(
         If a shape does not fit or a contour has gaps.
     """
     curves, light, shape = _flat(contours)
-    return *_closed_curves(_clip(curves, light)), shape
+    return *clip_curves(curves, light), shape
+
+
+def clip_curves(curves: FloatArray, light: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return `clip_to_horizon` of curves (m, 4, 3) that belong to lights (m).
+
+    Those of a light form closed contours, in any order, each curve ending with the same bits
+    as another begins with.
+    """
+    return _closed_curves(_clip(curves, light))
 
 
 def _sums(item: IntArray, values: npt.ArrayLike, n: int) -> FloatArray:
