@@ -8,8 +8,18 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from app.panels.widgets import button, choice, colour, heading, identity, numbers, position, slider
-from app.scene import Material, SceneObject
+from app.panels.widgets import (
+    button,
+    choice,
+    colour,
+    heading,
+    hint,
+    identity,
+    numbers,
+    position,
+    slider,
+)
+from app.scene import Material, SceneObject, Vec2
 from app.sliders import (
     ROUGHNESS_MIN,
     alpha_from_sliders,
@@ -27,6 +37,8 @@ PRESETS: tuple[tuple[str, str, Material], ...] = (
      Material("", (0.08, 0.08, 0.09), (0.06, 0.06, 0.06), (0.01, 0.01))),
     ("Steel", "Brushed metal without a direction",
      Material("", (0.0, 0.0, 0.0), (0.56, 0.57, 0.58), (0.09, 0.09))),
+    ("Brushed", "Aluminium brushed along the tangent",
+     Material("", (0.0, 0.0, 0.0), (0.91, 0.92, 0.92), (0.04, 0.36))),
     ("Gold", "Polished gold",
      Material("", (0.0, 0.0, 0.0), (1.0, 0.71, 0.29), (0.04, 0.04))),
     ("Copper", "Worn copper",
@@ -54,8 +66,7 @@ def material_panel(material: Material, anisotropic: bool = False) -> Material:
         roughness, anisotropy = sliders_from_alpha(material.alpha)
         rough = slider(
             "Roughness", roughness, ROUGHNESS_MIN, 1.0, "%.3f",
-            "GGX roughness; the papers' alpha is its square "
-            f"(now {material.alpha[0]:.4g}, {material.alpha[1]:.4g})",
+            "GGX roughness; the papers' alpha is its square",
         )  # fmt: skip
         stretched, rotation = anisotropy, material.rotation
         if anisotropic or material.is_anisotropic:
@@ -68,12 +79,20 @@ def material_panel(material: Material, anisotropic: bool = False) -> Material:
                 "Rotation", degrees, -180.0, 180.0, "%.1f°", "Turns the brushing about the normal"
             )
             rotation = math.radians(turned) if turned != degrees else material.rotation
+        hint(alpha_text(material.alpha))
     alpha = material.alpha
     if (rough, stretched) != (roughness, anisotropy):
         alpha = alpha_from_sliders(rough, stretched)
     if chosen is not None:
         return replace(chosen, name=material.name, rotation=material.rotation)
     return replace(material, diffuse=diffuse, f0=f0, alpha=alpha, rotation=rotation)
+
+
+def alpha_text(alpha: Vec2) -> str:
+    """Return the GGX parameters as a line to read, "αx 0.09, αy 0.36"."""
+    if alpha[0] == alpha[1]:
+        return f"α {alpha[0]:.4g}"
+    return f"αx {alpha[0]:.4g} along the tangent, αy {alpha[1]:.4g} across"
 
 
 def _presets() -> Material | None:

@@ -221,8 +221,9 @@ def suited_technique(text: str, anisotropic: bool) -> str:
     Notes
     -----
     ``auto`` is ``ltc`` for isotropic scenes: its mean error of .002 is below what
-    one sees, and ``ggx`` takes 2 to 3 times as long for a sixth of it. Anisotropic
-    lobes ``ltc`` cannot shade at all.
+    one sees, and ``ggx`` takes 2 to 3 times as long for a sixth of it. Anisotropic lobes are
+    long lunes, which no transform of a cosine has: there ``ltc`` errs .004, by 1 to 5 % of
+    a whole picture's mean and with streaks missing on brushed disks, against .0003 by ``ggx``.
     """
     if text == AUTOMATIC:
         return "ggx" if anisotropic else "ltc"

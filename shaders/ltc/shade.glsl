@@ -4,8 +4,10 @@
 #include "common/frame.glsl"
 #include "common/light_data.glsl"
 #include "common/material.glsl"
-#include "common/tangent_frame.glsl"
 #include "ltc/contour.glsl"
+#if TAKES_TANGENT
+#include "common/tangent_frame.glsl"
+#endif
 
 // A point to be shaded. Where the tables tell alpha_x from alpha_y (TAKES_TANGENT) x is the
 // tangent, else along the view.
@@ -16,12 +18,12 @@ struct SurfacePoint {
     vec2 alpha;
 };
 
+#if HAS_SPECULAR
 struct SpecularLobe {
     CosineTransform transform;
     vec2 albedo;  // (A, B) / share above the surface: f0 (A - B) + B is the reflectance
 };
 
-#if HAS_SPECULAR
 // By the pass that has the tables, see passes/table_storage.glsl.
 SpecularLobe specular_lobe(SurfacePoint point);
 #endif

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 
 from app.outline import boundary
-from app.presets import disk, ring
+from app.presets import disk, ring, star
 from app.render.picking import direction_from_octahedral, facing_normal
 from app.render.tables import isotropic_textures
 from app.render.truth import exact_radiance, shading_frames
 from app.scene import (
     AreaLight,
+    Camera,
     Material,
     Plane,
     RenderSettings,
@@ -128,3 +132,22 @@ def test_ggx_itself_is_that_of_fine_polygons():
     want, _ = specular_integral_batch(local, wo, alpha, alpha)
     # 240 edges around a circle lose 1e-4 of its area.
     np.testing.assert_allclose(specular[:, 0], want, rtol=3e-4, atol=1e-6)
+
+
+def test_brushed_surfaces_have_the_tangents_that_were_shaded(renderer):
+    """What a pixel shows is what the probe finds at its point, along its tangent."""
+    brushed = Material("m", (0.0,) * 3, (1.0,) * 3, (0.4, 0.1), math.radians(25.0))
+    ball = SceneObject("ball", "sphere", "m", Transform((0.5, 0.4, 1.0), scale=(0.4, 0.4, 0.4)))
+    lamp = replace(LAMP, outline=star())  # no curves, whose rules differ
+    above = Camera((0.5, 2.0, 1.6), (0.5, 0.0, 0.6))  # every pixel shows a surface
+    scene = Scene((brushed,), (replace(SCENE.objects[0], material="m"), ball), (lamp,), above)
+    renderer.render(Shot(scene, RenderSettings("ltc"), 48, 32))
+    seen, picture = renderer.surfaces(), renderer.radiance()
+    assert seen.tangent is not None
+    alphas = np.tile([0.4, 0.1], (len(seen.index), 1))
+    found = renderer.probe(
+        scene, RenderSettings("ltc"), seen.position, seen.normal, seen.tangent, seen.view, alphas
+    )["specular"]
+    np.testing.assert_allclose(found, picture.reshape(-1, 3), rtol=1e-4, atol=1e-5)
+    renderer.render(Shot(SCENE, RenderSettings("ltc"), 48, 32))
+    assert renderer.surfaces().tangent is None
