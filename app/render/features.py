@@ -170,6 +170,8 @@ class LightingFeatures:
         Some glossy material is anisotropic, and the technique shades it so.
     counts : bool
         Pixels get the number of evaluations instead of radiance.
+    anisotropic : bool
+        Lobes are looked up in the anisotropic tables, where the technique has tables.
     """
 
     specular: bool
@@ -181,6 +183,7 @@ class LightingFeatures:
     technique: str
     tangents: bool
     counts: bool
+    anisotropic: bool
 
     @classmethod
     def of(
@@ -204,6 +207,11 @@ class LightingFeatures:
         diffuse = shines and any(any(material.diffuse) for material in used)
         rounded = _rounded(TEXELS_PER_MATERIAL * len(used))
         fits = (specular or diffuse) and 16 * rounded <= limits.uniform_block_bytes
+        anisotropic = (
+            specular
+            and find_technique(technique).anisotropic
+            and any(material.is_anisotropic and any(material.f0) for material in used)
+        )
         return cls(
             specular,
             diffuse,
@@ -216,15 +224,14 @@ class LightingFeatures:
             or lights.curves == "whole"
             or (diffuse and find_technique(technique).has_own_diffuse)
             else DEFAULT_TECHNIQUE,
-            specular
-            and find_technique(technique).anisotropic
-            and any(material.is_anisotropic and any(material.f0) for material in used),
+            anisotropic,
             view == "cost",
+            anisotropic,
         )
 
     @property
     def reads_tables(self) -> bool:
-        """Whether the technique's tables are looked up: the anisotropic ones with ``tangents``."""
+        """Whether the technique's tables are looked up: the anisotropic ones if ``anisotropic``."""
         return self.specular and find_technique(self.technique).has_tables
 
     @property
@@ -250,21 +257,21 @@ class LightingFeatures:
             "PROBES": 0,
             "COUNTS_EVALUATIONS": int(self.counts),
             "HAS_TANGENTS": int(self.tangents),
-            **technique_defines(self.technique, self.tangents),
+            **technique_defines(self.technique, self.anisotropic),
             "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
             "MATERIAL_TEXELS": self.uniform_materials,
             **lights.defines(),
         }
 
 
-def technique_defines(technique: str, tangents: bool) -> dict[str, int]:
-    """Return the numbers that choose a technique's shaders, for surfaces with or without tangents.
+def technique_defines(technique: str, anisotropic: bool) -> dict[str, int]:
+    """Return the numbers that choose a technique's shaders, for lobes that may be anisotropic.
 
     What looks lobes up takes no tangent where none matters: it has an isotropic table.
     """
     choice = parse_technique(technique)
     has_tables = choice.technique.has_tables
-    takes_tangent = choice.technique.anisotropic and (tangents or not has_tables)
+    takes_tangent = choice.technique.anisotropic and (anisotropic or not has_tables)
     azimuths = anisotropic_azimuths() if has_tables and takes_tangent else (0, 0)
     defines = {
         "TECHNIQUE_GGX": int(choice.name == "ggx"),

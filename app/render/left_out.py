@@ -51,7 +51,7 @@ def left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
             why = f"technique {features.technique} needs none"
         else:
             why = f"{dark or 'every material has f0 = 0'}, so nothing looks them up"
-        tables = sum(int(texels.nbytes) for texels in table_textures(features.tangents).values())
+        tables = sum(int(texels.nbytes) for texels in table_textures(features.anisotropic).values())
         leave("tables of the technique", why, tables)
     if not features.diffuse:
         leave("diffuse shading", dark or "every material has diffuse = 0")

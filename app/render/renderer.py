@@ -562,7 +562,7 @@ class Renderer:
         if features.shades:
             self._hold_materials(scene, features.uniform_materials)
         if features.reads_tables:
-            self._lighting.load_tables(features.tangents)
+            self._lighting.load_tables(features.anisotropic)
         self._lighting.drop(
             lights=not features.lit,
             materials=not features.shades,
