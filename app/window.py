@@ -118,6 +118,7 @@ class Window:
             "Display": self._display_window,
             "Camera": self._panels.camera,
             "Performance": self._performance_window,
+            "Compare": lambda: self._panels.compare(self.viewport.comparison),
             "Plan": self._plan_window,
         }
         return {name: self._guarded(draw) for name, draw in windows.items()}
@@ -138,6 +139,8 @@ class Window:
             "escape": self.editor.escape,
             "frame": lambda: self.viewport.frame(self.editor),
             "overlays": lambda: self.viewport.toggle_overlays(),
+            "compare": lambda: self.viewport.comparison.toggle(),
+            "flip": lambda: self.viewport.comparison.flip(),
             "move": lambda: self.viewport.take("move"),
             "rotate": lambda: self.viewport.take("rotate"),
             "corner": lambda: self.viewport.outline.set_kind(self.editor, "corner"),
@@ -172,6 +175,7 @@ class Window:
 
     def _stop(self) -> None:
         self.exports.release()
+        self.viewport.comparison.release()
         self.renderer.release()
 
     # --- one frame ----------------------------------------------------------------
@@ -212,7 +216,8 @@ class Window:
     def _menus(self) -> None:
         file_menu(self._actions, self.documents.open)
         edit_menu(self._actions, self.editor)
-        view_menu(self._actions, self.viewport.show_overlays, self.params.docking_params)
+        view, windows = self.viewport, self.params.docking_params
+        view_menu(self._actions, view.show_overlays, view.comparison.is_on, windows)
 
     def _status(self) -> None:
         step, shot = self.editor.undo_name, self.viewport.picture.shot

@@ -18,6 +18,7 @@ _SPACES = {
     "Camera": "LeftLow",
     "Performance": "LeftLow",
     "Light": "Right",
+    "Compare": "Right",
     "Material": "RightLow",
     "Object": "RightLow",
     "Plan": "Right",

@@ -156,12 +156,18 @@ class LivePicture:
             return
         texture = self._renderer.texture
         self._renderer.ctx.screen.use()
-        same_size = texture.size == view.pixels
-        kind = moderngl.NEAREST if same_size else moderngl.LINEAR
-        if texture.filter != (kind, kind):
-            texture.filter = (kind, kind)
-        reference = imgui.ImTextureRef(texture.glo)
-        draw.add_image(reference, low, high, ImVec2(0.0, 1.0), ImVec2(1.0, 0.0))
+        draw_texture(texture, view)
+
+
+def draw_texture(texture: moderngl.Texture, view: View) -> None:
+    """Draw a picture with row 0 at the bottom over the whole view, smooth if it is smaller."""
+    kind = moderngl.NEAREST if texture.size == view.pixels else moderngl.LINEAR
+    if texture.filter != (kind, kind):
+        texture.filter = (kind, kind)
+    low, high = ImVec2(view.x, view.y), ImVec2(view.x + view.width, view.y + view.height)
+    reference = imgui.ImTextureRef(texture.glo)
+    draw = imgui.get_window_draw_list()
+    draw.add_image(reference, low, high, ImVec2(0.0, 1.0), ImVec2(1.0, 0.0))
 
 
 def _is_touched() -> bool:

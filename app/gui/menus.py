@@ -57,12 +57,19 @@ def edit_menu(actions: Actions, editor: Editor) -> None:
     imgui.end_menu()
 
 
-def view_menu(actions: Actions, overlays_shown: bool, docking: hello_imgui.DockingParams) -> None:
+def view_menu(
+    actions: Actions,
+    overlays_shown: bool,
+    compares: bool,
+    docking: hello_imgui.DockingParams,
+) -> None:
     """Draw the menu of what is shown, the docked windows among it."""
     if not imgui.begin_menu("View"):
         return
     _item(actions, "frame", "Look at selection")
     _item(actions, "overlays", "Outlines and handles", checked=overlays_shown)
+    _item(actions, "compare", "Compare with another technique", checked=compares)
+    _item(actions, "flip", "Flip to the other technique and back")
     imgui.separator()
     for window in docking.dockable_windows:
         if window.label != "Viewport" and imgui.menu_item_simple(

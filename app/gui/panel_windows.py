@@ -12,8 +12,10 @@ from dataclasses import replace
 from app import edits, step_names
 from app.editor import Editor
 from app.gui.beginning import first_material
+from app.gui.comparison import Comparison
 from app.gui.imports import Imports
 from app.panels.camera import camera_panel
+from app.panels.compare import compare_panel
 from app.panels.display import display_panel
 from app.panels.light import light_panel, rename_field
 from app.panels.material import material_panel, object_panel
@@ -21,6 +23,9 @@ from app.panels.scene_tree import scene_panel
 from app.panels.widgets import button, hint, name_field
 from app.render.techniques import AUTOMATIC, TECHNIQUES, find_technique, suited_technique
 from app.scene import Material, RenderSettings, Scene, SceneObject, TextSource
+
+MEASURES = ("reference", "ggx:4", "ltc:6")
+"""What to compare with first: what is exact, or nearly, in the limit or at once."""
 
 
 class PanelWindows:
@@ -135,6 +140,11 @@ class PanelWindows:
         display, settings = display_panel(scene.display, settings, (AUTOMATIC, *TECHNIQUES))
         self._stage(replace(scene, display=display))
         return settings
+
+    def compare(self, comparison: Comparison) -> None:
+        """Draw the panel of what the picture is compared with."""
+        names = (*MEASURES, AUTOMATIC, *(name for name in TECHNIQUES if name not in MEASURES))
+        comparison.form = compare_panel(comparison.form, names, comparison.report())
 
     def camera(self) -> None:
         """Draw the panel of the view, which is no step of the history."""

@@ -21,6 +21,7 @@ from app import edits, lights, planes
 from app.editor import NOTHING, Editor, Selection
 from app.errors import InputError
 from app.gui import theme
+from app.gui.comparison import Comparison
 from app.gui.legend import draw_legend
 from app.gui.live_picture import LivePicture
 from app.gui.messages import Messages
@@ -71,6 +72,7 @@ class Viewport:
         self.help = ""
         self.view = View(0.0, 0.0, 1.0, 1.0, (1, 1))
         self.picture = LivePicture(renderer, messages)
+        self.comparison = Comparison(renderer, messages)
         self.outline = OutlineTool(messages)
         self._renderer = renderer
         self._messages = messages
@@ -100,7 +102,7 @@ class Viewport:
     @property
     def is_idle(self) -> bool:
         """Whether nothing is left to do until the user does something."""
-        return self.is_settled and not self._is_asking
+        return self.is_settled and not self._is_asking and self.comparison.is_idle
 
     def frame(self, editor: Editor) -> None:
         """Turn the camera's attention to what is selected, or to the whole scene."""
@@ -125,17 +127,27 @@ class Viewport:
             self.outline.submit(editor, self._sight(editor.scene))
         else:
             self.outline.let_go()
+        self.comparison.divide(self.view)
         self._canvas(editor)
-        scene = editor.scene
-        self.picture.render(scene, self.camera_of(scene), self.settings, self.view.pixels)
-        self.picture.draw(self.view)
-        if self.settings.view == "cost":
+        self._picture(editor.scene)
+        if self.comparison.shows_cost(self.settings):
             draw_legend(self.view, cost.LEGEND)
         self._is_asking = False
         if self.show_overlays:
             self._overlays(editor)
             self._manipulate(editor)
             help_line(self.view, self.help)
+
+    def _picture(self, scene: Scene) -> None:
+        """Render what is missing of the picture, or of both that are compared, and draw it."""
+        view, camera, comparison = self.view, self.camera_of(scene), self.comparison
+        settings = comparison.settings(scene, self.settings)
+        self.picture.render(scene, camera, settings[0], view.pixels)
+        comparison.render(scene, camera, settings, view.pixels, self.picture)
+        if comparison.is_on:
+            comparison.draw(view, self.picture)
+        else:
+            self.picture.draw(view)
 
     def camera_of(self, scene: Scene) -> Camera:
         """Return the camera that the picture is seen with."""

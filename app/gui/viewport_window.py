@@ -56,4 +56,10 @@ def _tools(viewport: Viewport, frame: Callable[[], None]) -> None:
         f"{icons.ICON_FA_CROSSHAIRS}###frame", f"Look at what is selected ({key_of('frame')})"
     ):
         frame()
-    imgui.pop_style_color()
+    imgui.same_line(0.0, 0.3 * em)
+    on = viewport.comparison.is_on
+    imgui.push_style_color(imgui.Col_.text, theme.ACCENT if on else theme.grey(0.85))
+    tip = f"Compare with another technique ({key_of('compare')}); {key_of('flip')} flips"
+    if button(f"{icons.ICON_FA_ADJUST}###compare", tip, width=2.1 * em):
+        viewport.comparison.toggle()
+    imgui.pop_style_color(2)

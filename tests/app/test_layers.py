@@ -30,7 +30,7 @@ WINDOW = {
     "app.gui.viewport_window", "app.gui.viewport", "app.gui.overlays", "app.gui.placement",
     "app.gui.dialogs", "app.gui.message_list", "app.gui.exports", "app.gui.reports",
     "app.gui.theme", "app.gui.live_picture", "app.gui.grips", "app.gui.outline_tool",
-    "app.gui.legend",
+    "app.gui.legend", "app.gui.comparison",
 }  # fmt: skip
 TOP = {"app.window", "app.cli", "app.__main__"}
 """What nothing below may import: each starts the program."""

@@ -41,7 +41,7 @@ from app.scene import (
     Transform,
 )
 from app.scene_io import load_scene
-from tests.gui import outlines
+from tests.gui import comparing, outlines
 from tests.gui.application import Application
 
 CTRL, SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
@@ -625,6 +625,7 @@ SCENARIOS = (
     names_and_visibility,
     menus_open,
     *outlines.SCENARIOS,
+    *comparing.SCENARIOS,
 )
 
 

@@ -52,6 +52,11 @@ SCENARIOS = (
     "presets_from_the_menu",
     "type_a_text",
     "drop_a_drawing_and_a_font",
+    "flip_between_two_techniques",
+    "drag_the_divider",
+    "differences_in_false_colours",
+    "numbers_of_the_view",
+    "comparing_costs_nothing_at_rest",
 )
 
 pytestmark = pytest.mark.skipif(
