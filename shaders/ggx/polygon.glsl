@@ -134,6 +134,12 @@ GgxLight ggx_light(PlanarLight light, PlaneView plane, mat3 tangent_from_world, 
     return result;
 }
 
+// Unit half vector of the way to the light's origin, which is about its middle.
+vec3 origin_half_vector(PlaneView plane, mat3 tangent_from_world, GgxView view)
+{
+    return normalize((view.wo + normalize(tangent_from_world * plane.offset)) * view.inverse_alpha);
+}
+
 // Unit direction to center + dp as a difference from the direction to the centre.
 vec3 direction_difference(GgxLight light, vec3 dp, float distance)
 {
@@ -332,13 +338,16 @@ vec2 ggx_light_specular(
         }
         vector = pinned ? pinned_vector(about, pinned_sum, view) : vector;
         vector *= winding;
-        share = min(scale * dot(vector, view.bent) + slivers, 1.0);
-        float length2 = dot(vector, vector);
-        // Nothing lit, or no more than rounding.
-        if (!(share > 0.0) || length2 < 1e-36) {
+        float chords = scale * dot(vector, view.bent);
+        share = min(chords + slivers, 1.0);
+        if (!(share > 0.0)) {
             return vec2(0.0);
         }
-        center = pinned ? normalize(about.half_vector) : vector * inversesqrt(length2);
+        // Of a light that is all slivers, far away and round, chords say nothing of where it is.
+        float length2 = dot(vector, vector);
+        bool is_vague = pinned || chords < 0.5 * share || length2 < 1e-36;
+        center = is_vague ? origin_half_vector(plane, tangent_from_world, view)
+                          : vector * inversesqrt(length2);
         at_center = ggx_weights(center, view);
 #if GGX_NODES == 1
         break;

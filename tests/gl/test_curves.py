@@ -278,6 +278,24 @@ def test_tiny_far_lights_keep_their_digits(renderer):
         assert np.median(np.abs(got / np.where(seen, want, 1.0) - 1.0)[seen]) <= 2e-2
 
 
+@pytest.mark.parametrize("technique", ["ltc", "ggx"])
+def test_a_receding_round_light_never_goes_out(renderer, technique):
+    """Far away one chord stands for all of it, which is no longer than nothing."""
+    distance = np.geomspace(3.0, 3e5, 400)
+    toward = unit(np.array([0.5, 0.2, 1.0]))
+    normal = unit(np.array([0.6, 0.1, 0.3]) - toward)
+    points = Points(
+        distance[:, None] * toward,
+        np.tile(normal, (400, 1)),
+        np.tile(toward - 2.0 * normal * (normal @ toward), (400, 1)),
+        np.full((400, 2), 0.2),
+    )
+    lamp = lamp_of(heart(), Plane((0.0, 0.0, 0.0)))
+    seen = probe(renderer, lamp, points, technique)[0] * distance**2
+    # Seen: 1e-3 per step, of the chords, which are certified absolutely.
+    assert np.max(np.abs(np.diff(np.log(seen[distance > 30.0])))) <= 5e-3
+
+
 def curve(*points: tuple[float, float]) -> FloatArray:
     return np.array(points, dtype=np.float64)
 

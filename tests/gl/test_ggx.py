@@ -56,6 +56,7 @@ GPU_ONLY = {
     "fan_node": STAGE,
     "ggx_light": STAGE,
     "direction_difference": STAGE,
+    "origin_half_vector": STAGE,
     "is_pinned": STAGE,
     "add_pinned_edge": STAGE,
     "pinned_vector": STAGE,
