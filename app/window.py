@@ -34,6 +34,7 @@ from app.gui.exports import Exports
 from app.gui.imports import Imports
 from app.gui.keyboard import act_on_keys
 from app.gui.layout import TITLE, docking, runner_params
+from app.gui.lobe_window import LobeWindow
 from app.gui.menus import edit_menu, file_menu, view_menu
 from app.gui.message_list import draw_messages
 from app.gui.messages import Messages
@@ -54,7 +55,7 @@ from app.scene import Scene
 class Window:
     """The application: an editor, a renderer, and what joins them on the screen.
 
-    Renderer, viewport and exports need OpenGL; they are there once it is.
+    Renderer, viewport, exports and lobe need OpenGL; they are there once it is.
 
     Parameters
     ----------
@@ -67,6 +68,7 @@ class Window:
     renderer: Renderer
     viewport: Viewport
     exports: Exports
+    lobe: LobeWindow
 
     def __init__(self, scene: Scene, path: Path | None = None) -> None:
         self.editor = Editor(scene, path)
@@ -92,6 +94,7 @@ class Window:
         self.editor.selection = first_selection(scene)
         self.messages.clear()
         self._panels.begin(scene)
+        self.lobe.begin()
 
     # --- set-up -------------------------------------------------------------------
 
@@ -113,6 +116,7 @@ class Window:
             "Viewport": self._viewport_window,
             "Scene": self._panels.scene,
             "Light": self._panels.light,
+            "Lobe": self._lobe_window,
             "Material": lambda: self._panels.material(self.viewport.settings),
             "Object": self._panels.object,
             "Display": self._display_window,
@@ -141,6 +145,7 @@ class Window:
             "overlays": lambda: self.viewport.toggle_overlays(),
             "compare": lambda: self.viewport.comparison.toggle(),
             "flip": lambda: self.viewport.comparison.flip(),
+            "pin": lambda: self.lobe.toggle_pin(),
             "move": lambda: self.viewport.take("move"),
             "rotate": lambda: self.viewport.take("rotate"),
             "corner": lambda: self.viewport.outline.set_kind(self.editor, "corner"),
@@ -165,6 +170,7 @@ class Window:
         """Create what needs the GL context; hello_imgui calls this when it is there."""
         self.renderer = Renderer(moderngl.create_context())
         self.viewport = Viewport(self.renderer, self.messages)
+        self.lobe = LobeWindow(self.renderer.ctx)
         self.exports = Exports(
             self.editor, self.viewport, self.renderer, self.messages, self.dialogs
         )
@@ -176,6 +182,7 @@ class Window:
     def _stop(self) -> None:
         self.exports.release()
         self.viewport.comparison.release()
+        self.lobe.release()
         self.renderer.release()
 
     # --- one frame ----------------------------------------------------------------
@@ -183,6 +190,8 @@ class Window:
     def _each_frame(self) -> None:
         """What is not inside a docked window: keys, dialogs, messages, the end of drags."""
         act_on_keys(self._actions)
+        self.lobe.point_at(self.viewport.hovered, self.editor)
+        self.viewport.pin = self.lobe.pin(self.editor, self.viewport.camera_of(self.editor.scene))
         self.dialogs.poll()
         dropped, self.dropped = self.dropped, []
         self.documents.drop(dropped)
@@ -194,7 +203,7 @@ class Window:
         above_help = 2.4 * imgui.get_font_size() if self.viewport.show_overlays else 0.0
         draw_messages(self.messages, view.x + view.width, view.y + view.height - above_help)
         self._update_title()
-        if not self.viewport.is_idle or self.exports.is_busy:
+        if not (self.viewport.is_idle and self.lobe.is_settled) or self.exports.is_busy:
             hello_imgui.request_refresh()
 
     def _ask_about_unsaved(self) -> None:
@@ -217,7 +226,8 @@ class Window:
         file_menu(self._actions, self.documents.open)
         edit_menu(self._actions, self.editor)
         view, windows = self.viewport, self.params.docking_params
-        view_menu(self._actions, view.show_overlays, view.comparison.is_on, windows)
+        compares, pinned = view.comparison.is_on, self.lobe.is_pinned
+        view_menu(self._actions, view.show_overlays, compares, pinned, windows)
 
     def _status(self) -> None:
         step, shot = self.editor.undo_name, self.viewport.picture.shot
@@ -234,6 +244,9 @@ class Window:
 
     def _display_window(self) -> None:
         self.viewport.settings = self._panels.display(self.viewport.settings)
+
+    def _lobe_window(self) -> None:
+        self.lobe.draw(self.editor, self.viewport.camera_of(self.editor.scene))
 
     def _performance_window(self) -> None:
         shot = self.viewport.picture.shot

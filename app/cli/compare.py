@@ -23,9 +23,9 @@ from app.cli.common import (
     results,
     whole_number,
 )
+from app.colour_maps import SEQUENTIAL
 from app.errors import InputError, expected_one_of
 from app.images import IMAGE_SUFFIXES, check_image_path, read_image, save_image
-from app.render.colour_maps import SEQUENTIAL
 from app.render.comparison import SAMPLED, Pictures, shared_samples
 from app.render.difference import (
     DIFFERENCE_VIEWS,

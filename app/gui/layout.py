@@ -19,6 +19,7 @@ _SPACES = {
     "Performance": "LeftLow",
     "Light": "Right",
     "Compare": "Right",
+    "Lobe": "Right",
     "Material": "RightLow",
     "Object": "RightLow",
     "Plan": "Right",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.colour_maps import HEIGHT, WIDTH, Colour, Legend
 from app.gui import theme
 from app.gui.overlays import View
-from app.render.colour_maps import HEIGHT, WIDTH, Colour, Legend
 
 
 def draw_legend(view: View, legend: Legend) -> None:

@@ -15,7 +15,7 @@ from app import contours, lights, planes
 from app.curves import pieces, subdivide
 from app.gui import theme
 from app.scene import AnchorKind, AreaLight, Camera, Plane, Vec2, Vec3
-from app.vectors import add, scale
+from app.vectors import add, length, scale, subtract
 
 FloatArray = NDArray[np.float64]
 
@@ -150,6 +150,20 @@ class Canvas:
         at = self.sight.project(tip)
         if at is not None:
             self.draw.add_circle_filled(ImVec2(*at), 3.0, theme.u32(theme.ACCENT, 0.8))
+
+    def pin(self, position: Vec3, normal: Vec3, tangent: Vec3) -> None:
+        """Draw a surface point with its normal and, fainter, its tangent."""
+        at = self.sight.project(position)
+        if at is None:
+            return
+        reach = 0.07 * length(subtract(position, self.sight.camera.eye))
+        for way, alpha in ((tangent, 0.55), (normal, 1.0)):
+            tip = add(position, scale(way, reach))
+            self.segment(position, tip, theme.u32(theme.grey(0.0), 0.6 * alpha), 3.6)
+            self.segment(position, tip, theme.u32(theme.ACCENT, alpha), 1.6)
+        centre = ImVec2(*at)
+        self.draw.add_circle_filled(centre, 4.5 * self.unit, theme.u32(theme.grey(0.0), 0.7))
+        self.draw.add_circle_filled(centre, 3.0 * self.unit, theme.u32(theme.ACCENT))
 
     def vertex(
         self,

@@ -31,7 +31,7 @@ from app.gui.placement import box_corners, moved_by, name_of, pose_of, sphere_ar
 from app.render import cost
 from app.render.picking import Hit
 from app.render.renderer import Renderer
-from app.scene import Camera, RenderSettings, Scene, SceneError, Shot, Vec2
+from app.scene import Camera, RenderSettings, Scene, SceneError, Shot, Vec2, Vec3
 from app.vectors import add, length, subtract
 
 STILL_SAMPLES = 32
@@ -56,6 +56,9 @@ class GizmoDrag:
 
 class Viewport:
     """Draws the picture and turns what is done to it into edits.
+
+    ``hovered`` is what was under the pointer last; ``pin`` a point to mark, with its normal
+    and tangent.
 
     Parameters
     ----------
@@ -84,6 +87,8 @@ class Viewport:
         self._unasked: list[tuple[tuple[int, int], Vec2]] = []
         self._is_asking = False
         self._occlusion_of: tuple[Shot | None, int, tuple[lights.Vertex, ...]] | None = None
+        self.hovered: Hit | None = None
+        self.pin: tuple[Vec3, Vec3, Vec3] | None = None
         self._hovered_light: int | None = None
         self._asked: Hit | None = None
 
@@ -286,6 +291,7 @@ class Viewport:
             hit = self._hit(io.mouse_pos.x, io.mouse_pos.y)
             is_light = hit is not None and hit.kind == "light" and hit.index < len(scene.lights)
             self._hovered_light = hit.index if hit is not None and is_light else None
+            self.hovered = hit
 
     # --- gizmo ---------------------------------------------------------------------
 
@@ -344,6 +350,8 @@ class Viewport:
         if chosen.kind == "object":
             with contextlib.suppress(InputError):
                 canvas.box(box_corners(scene, chosen.index))
+        if self.pin is not None:
+            canvas.pin(*self.pin)
         draw.pop_clip_rect()
 
     def _find_hidden(self, scene: Scene, index: int) -> None:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.colour_maps import INK, PAPER, draw_legend
 from app.render import difference as of
-from app.render.colour_maps import INK, PAPER, draw_legend
 from app.render.difference import Measure, Numbers, Scale
 from app.render.flip import flip
 from app.scene import MAX_SAMPLES, AreaLight

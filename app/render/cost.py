@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from app.colour_maps import VIRIDIS, Legend, colours_at, draw_legend
 from app.images import Picture
-from app.render.colour_maps import VIRIDIS, Legend, colours_at, draw_legend
 
 OCTAVES = 12
 """Doublings from one end of the scale, 1 evaluation, to the other, 4,096 or more."""

@@ -14,8 +14,8 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from app.render.colour_maps import BERLIN, SEQUENTIAL, Colour, ColourMap, Legend, MapName
-from app.render.colour_maps import colours_at as map_colours
+from app.colour_maps import BERLIN, SEQUENTIAL, Colour, ColourMap, Legend, MapName
+from app.colour_maps import colours_at as map_colours
 from app.scene import AreaLight
 
 FloatArray = NDArray[np.float64]

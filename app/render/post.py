@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from app.render.colour_maps import VIRIDIS, ColourMap
+from app.colour_maps import VIRIDIS, ColourMap
 from app.render.cost import EMPTY, NONE, OCTAVES
 from app.render.programs import Programs, ProgramSpec, set_uniform
 from app.render.state import FullScreenTriangle, begin_pass

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from app.colour_maps import draw_legend
 from app.context import headless_context
-from app.render.colour_maps import draw_legend
 from app.render.cost import LEGEND
 from app.render.renderer import Renderer
 from app.scene import RenderSettings, Shot

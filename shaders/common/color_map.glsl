@@ -1,4 +1,4 @@
-// Colours for numbers. `map_colors` are a map of app/render/colour_maps.py, whose colours_at
+// Colours for numbers. `map_colors` are a map of app/colour_maps.py, whose colours_at
 // is the twin.
 
 uniform vec3 map_colors[MAP_COLORS];  // sRGB, 0 to 1

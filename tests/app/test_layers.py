@@ -24,6 +24,7 @@ PURE = {
     "app.gui.file_types",
     "app.loops", "app.text", "app.text_runs", "app.svg", "app.svg_paths", "app.svg_tree",
     "app.json_reader", "app.json_writer", "app.light_io", "app.plan_rows",
+    "app.colour_maps", "app.lobe_picture",
 }  # fmt: skip
 WINDOW = {
     "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",
@@ -31,6 +32,7 @@ WINDOW = {
     "app.gui.dialogs", "app.gui.message_list", "app.gui.exports", "app.gui.reports",
     "app.gui.theme", "app.gui.live_picture", "app.gui.grips", "app.gui.outline_tool",
     "app.gui.legend", "app.gui.comparison",
+    "app.gui.lobe_window", "app.gui.lobe_point",
 }  # fmt: skip
 TOP = {"app.window", "app.cli", "app.__main__"}
 """What nothing below may import: each starts the program."""

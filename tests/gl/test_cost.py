@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.colour_maps import VIRIDIS, draw_legend
 from app.presets import heart, ring
-from app.render.colour_maps import VIRIDIS, draw_legend
 from app.render.cost import (
     EMPTY,
     LEGEND,

@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from app.render.colour_maps import BERLIN, MAGMA, SEQUENTIAL, colours_at
+from app.colour_maps import BERLIN, MAGMA, SEQUENTIAL, colours_at
 from app.render.difference import (
     DIFFERENCE_VIEWS,
     LUMINANCE,

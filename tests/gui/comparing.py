@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from imgui_bundle import imgui
 
+from app.colour_maps import BERLIN, MAGMA
 from app.panels.compare import Comparing
-from app.render.colour_maps import BERLIN, MAGMA
 from app.render.difference import Scale, colours_of, numbers, values_of
 from app.render.flip import flip
 from tests.gui.application import Application

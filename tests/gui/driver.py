@@ -23,11 +23,11 @@ from imgui_bundle import imgui
 
 from app import edits, lights, planes
 from app import window as window_module
+from app.colour_maps import VIRIDIS
 from app.editor import NOTHING, Selection
 from app.panels.export import Export
 from app.panels.plan import PlanReport
 from app.plan_rows import section_lines
-from app.render.colour_maps import VIRIDIS
 from app.scene import (
     AreaLight,
     Camera,
@@ -41,7 +41,7 @@ from app.scene import (
     Transform,
 )
 from app.scene_io import load_scene
-from tests.gui import comparing, outlines
+from tests.gui import comparing, lobes, outlines
 from tests.gui.application import Application
 
 CTRL, SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
@@ -626,6 +626,7 @@ SCENARIOS = (
     menus_open,
     *outlines.SCENARIOS,
     *comparing.SCENARIOS,
+    *lobes.SCENARIOS,
 )
 
 

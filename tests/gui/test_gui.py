@@ -57,6 +57,9 @@ SCENARIOS = (
     "differences_in_false_colours",
     "numbers_of_the_view",
     "comparing_costs_nothing_at_rest",
+    "lobe_under_the_pointer",
+    "pinned_lobe",
+    "lobe_by_hand",
 )
 
 pytestmark = pytest.mark.skipif(

@@ -1,0 +1,162 @@
+"""The surface point whose lobe is shown, kept in its object's space so that it moves with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app import contours
+from app.lobe_picture import directions_above
+from app.panels.lobe_pictures import LightLine
+from app.render.camera import world_from_object
+from app.render.picking import Hit, facing_normal
+from app.render.truth import shading_frames
+from app.scene import AreaLight, Camera, Scene
+from ltc.bezier import evaluate
+from ltc.lobe import THETA_MAX, Case, about_normal
+
+FloatArray = NDArray[np.float64]
+
+FEW, MANY = 4, 64
+"""Points on a curve of an outline, for outlines of many curves and of few."""
+POINTS = 4000
+"""How many points to spend on an outline."""
+STEP = math.radians(3.0)
+"""Curves whose points are further apart than this in a point's sky get others."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfacePoint:
+    """A point of an object, its normal (as a covector) and its mesh's tangent, in object space.
+
+    ``tangent`` is None where the picture has no tangents: materials count as isotropic there.
+    """
+
+    object: str
+    mesh: str
+    position: FloatArray
+    normal: FloatArray
+    tangent: FloatArray | None
+
+    @staticmethod
+    def of(hit: Hit, scene: Scene) -> SurfacePoint | None:
+        """Return the point that was hit, None if it is a light's or of another scene."""
+        if hit.kind != "object" or hit.index >= len(scene.objects):
+            return None
+        item = scene.objects[hit.index]
+        matrix = world_from_object(item.transform)
+        linear = matrix[:3, :3]
+        inverse = np.asarray(np.linalg.inv(linear), dtype=np.float64)
+        position = inverse @ (np.array(hit.position_ws) - matrix[:3, 3])
+        tangent = None if hit.tangent_ws is None else inverse @ np.array(hit.tangent_ws)
+        normal = linear.T @ np.array(hit.normal_ws)
+        return SurfacePoint(item.name, item.mesh, position, normal, tangent)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subject:
+    """A point as it is seen now.
+
+    Attributes
+    ----------
+    title, note : of what the point is on, and what to say about it
+    case : its material and its view
+    position : (3,) world space [m]
+    frame : (3, 3), rows x, y, z of the shading frame; x the material's tangent, or the
+        view's side where the material is isotropic
+    """
+
+    title: str
+    note: str
+    case: Case
+    position: FloatArray
+    frame: FloatArray
+
+
+def subject_of(point: SurfacePoint, scene: Scene, camera: Camera) -> Subject | None:
+    """Return a point as ``camera`` sees it in ``scene``, None if its object is gone."""
+    item = next((o for o in scene.objects if (o.name, o.mesh) == (point.object, point.mesh)), None)
+    if item is None:
+        return None
+    material = scene.material_of(item)
+    matrix = world_from_object(item.transform)
+    linear = matrix[:3, :3]
+    position = linear @ point.position + matrix[:3, 3]
+    wo = np.array(camera.eye) - position
+    wo = wo / np.linalg.norm(wo)
+    normal = np.asarray(np.linalg.solve(linear.T, point.normal), dtype=np.float64)
+    normal /= np.linalg.norm(normal)
+    normal = facing_normal((normal if normal @ wo >= 0.0 else -normal)[None], wo[None])[0]
+    ax, ay = material.alpha
+    note = ""
+    frame = shading_frames(normal[None], wo[None])[0]
+    if ax != ay and point.tangent is None:
+        ax = ay = math.sqrt(ax * ay)
+        note = "This technique shades it as isotropic."
+    elif ax != ay and point.tangent is not None:
+        frame = _tangent_frame(normal, linear @ point.tangent, material.rotation)
+    x, y, z = (frame @ wo).tolist()
+    theta = min(math.atan2(math.hypot(x, y), z), float(THETA_MAX))
+    phi = math.atan2(y, x) if ax != ay else 0.0
+    return Subject(
+        f"On '{item.name}', material '{material.name}'",
+        note,
+        Case(ax, ay, theta, phi),
+        position,
+        frame,
+    )
+
+
+def _tangent_frame(normal: FloatArray, tangent: FloatArray, rotation: float) -> FloatArray:
+    """Return the rows x, y, z of a material's frame, as ``shaders/passes/lighting.frag``."""
+    t = tangent - normal * (normal @ tangent)
+    length = float(np.linalg.norm(t))
+    if not length > 1e-4 * float(np.linalg.norm(tangent)):  # at a pole of the mesh's tangents
+        axis = [1.0, 0.0, 0.0] if abs(normal[0]) < 0.5 else [0.0, 1.0, 0.0]
+        t = np.array(axis) - normal * (normal @ np.array(axis))
+        length = float(np.linalg.norm(t))
+    frame = np.stack([t / length, np.cross(normal, t / length), normal])
+    return np.asarray(about_normal(rotation).T @ frame)
+
+
+def light_lines(
+    lights: Sequence[AreaLight], chosen: int | None, subject: Subject
+) -> tuple[LightLine, ...]:
+    """Return the outlines of lights as a point sees them, of the one ``chosen`` last."""
+    lines = []
+    for index, light in enumerate(lights):
+        origin, u, v = (np.array(a) for a in (light.plane.origin, light.plane.u, light.plane.v))
+        front = float(np.cross(u, v) @ (subject.position - origin)) > 0.0
+        shines = any(light.radiance) and (front or light.two_sided)
+        segments = contours.segments_of(light.outline)
+        world = origin + segments.curves @ np.stack([u, v])
+        points = _subdivided(world, subject.position)
+        for first, last in pairwise(segments.starts):
+            line = np.concatenate([*points[first:last], points[first][:1]])
+            lines += [
+                LightLine(run, shines, index == chosen)
+                for run in directions_above(line, subject.position, subject.frame)
+            ]
+    return tuple(sorted(lines, key=lambda line: (line.chosen, line.shines)))
+
+
+def _subdivided(curves: FloatArray, position: FloatArray) -> list[FloatArray]:
+    """Return points of curves (n, 4, 3), (k, 3) each without their ends, dense in the sky."""
+    count = int(np.clip(POINTS // len(curves), FEW, MANY))
+    t = np.linspace(0.0, 1.0, count + 1)
+    points = evaluate(curves[:, None], t)
+    ways = points - position
+    ways /= np.maximum(np.linalg.norm(ways, axis=-1, keepdims=True), 1e-300)
+    steps = np.linalg.norm(np.diff(ways, axis=1), axis=-1)
+    found = list(points[:, :-1])
+    for i in np.flatnonzero(steps.max(axis=1) > STEP):
+        # Again at places that are evenly spread in the sky, as far as the first ones tell.
+        along = np.concatenate([[0.0], np.cumsum(np.maximum(steps[i], 1e-9))])
+        again = np.interp(np.linspace(0.0, along[-1], MANY + 1), along, t)
+        found[i] = evaluate(curves[i], again)[:-1]
+    return found
