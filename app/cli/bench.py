@@ -32,9 +32,11 @@ from app.cli.common import (
     results,
     whole_number,
 )
-from app.cli.measure import Errors, Exact, Quartiles, mean_evaluations, measure_in_turn
 from app.errors import InputError
 from app.files import check_output, replace_file
+from app.measure.entries import Entry
+from app.measure.errors import Errors, Exact, mean_evaluations
+from app.measure.times import Quartiles, measure_in_turn
 from app.plan_rows import format_bytes
 from app.render.techniques import AUTOMATIC, suited_technique, technique_of
 from app.scene import ALPHA_MIN, Material, RenderSettings, Scene, Shot
@@ -47,7 +49,7 @@ BASELINE = "no shading"
 
 MAX_REPEATS = 100_000
 MAX_POINTS = 100_000
-WIDEST = 240
+WIDEST = 320
 """Characters of a table that goes to a file: all columns with errors, unfolded."""
 
 
@@ -164,17 +166,21 @@ def bench(
     with headless_renderer() as (ctx, renderer), ExitStack() as stack:
         device = str(ctx.info["GL_RENDERER"])
         if is_software(device):
-            renderer.use_wall_clock()
+            renderer.use_clock("wall clock")
         rows = []
         exact = Exact(renderer, points)
         renderers = [renderer, *([stack.enter_context(_full(renderer))] if everything else [])]
         with Steps("measuring", len(jobs) * (warm_up + repeats) * len(renderers)) as steps:
+
+            def one_more() -> None:
+                steps.done(steps.count + 1)
+
             for job in jobs:
-                measured = measure_in_turn(ctx, renderers, job.shot, warm_up, repeats, steps)
+                measured = measure_in_turn(ctx, renderers, job.shot, warm_up, repeats, one_more)
                 for one, (passes, wall) in zip(renderers, measured, strict=True):
                     errors, evaluations, held = {}, None, sum(one.allocated().values())
                     if points and job.technique != BASELINE and not one.everything:
-                        errors = exact.errors(job.shot)
+                        errors = exact.errors(job.shot, Entry(job.shot.settings.technique))
                         evaluations = mean_evaluations(one, job.shot)
                     rows.append(
                         Row(
@@ -214,7 +220,7 @@ def _full(like: Renderer) -> Iterator[Renderer]:
     """Make a renderer that leaves nothing out, and measures time as ``like`` does."""
     renderer = type(like)(like.ctx, everything=True)
     if like.timing_source == "wall clock":
-        renderer.use_wall_clock()
+        renderer.use_clock("wall clock")
     try:
         yield renderer
     finally:

@@ -71,7 +71,8 @@ def whole_number(option: str, least: int, most: int) -> Callable[[str | int], in
     return read
 
 
-def _list_techniques(value: list[str] | str | None) -> list[str] | str | None:
+def list_techniques(value: list[str] | str | None) -> list[str] | str | None:
+    """Print the techniques and leave, if one of those asked for is ``help``."""
     names = [value] if isinstance(value, str) else value or []
     if "help" in names:
         for line in technique_lines():
@@ -101,7 +102,7 @@ TechniqueOption = Annotated[
         "--technique",
         metavar="NAME[:N]",
         help="How to shade; 'help' lists the techniques.",
-        callback=_list_techniques,
+        callback=list_techniques,
         is_eager=True,
     ),
 ]
@@ -115,7 +116,7 @@ TechniquesOption = Annotated[
         "--technique",
         metavar="NAME[:N]",
         help="How to shade; repeat for several, 'help' lists them.",
-        callback=_list_techniques,
+        callback=list_techniques,
         is_eager=True,
     ),
 ]

@@ -1,22 +1,19 @@
-"""Scatter plots with logarithmic axes as SVG text, for pages that load nothing.
-
-Text and axes take the colour of the text around the picture (``currentColor``), points have
-colours that can be told on white and on black: a plot reads the same on light and dark pages.
-"""
+"""Scatter plots with logarithmic axes, for pages that load nothing and for files."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
-WIDTH, HEIGHT = 560, 360
+from app.cli.drawing import LETTER, Drawing, Line, Mark, Shape, Words
+
+WIDTH, HEIGHT = 560, 380
 LEFT, RIGHT, TOP, BOTTOM = 64, 20, 14, 46
 """Margins of the axes [px]."""
 
-LETTER, LINE = 6.2, 12.0
-"""Width of a letter and height of a line of 11 px text, about [px]."""
+SIZE = 11.0
+"""Of the letters at points and ticks [px]."""
 
 LEAST_OCTAVES = 1.0
 """An axis spans at least a factor of 2 to either side of what it shows."""
@@ -24,7 +21,11 @@ LEAST_OCTAVES = 1.0
 
 @dataclass(frozen=True)
 class Point:
-    """One mark: ``low`` to ``high`` is the range of x that its whisker shows."""
+    """One mark: ``low`` to ``high`` is the range of x that its whisker shows.
+
+    Points of the same ``series`` are joined in their order, those of none by nothing; ``low_y``
+    to ``high_y`` is the range of y, where there is one.
+    """
 
     x: float
     y: float
@@ -33,6 +34,10 @@ class Point:
     low: float
     high: float
     on_front: bool = False
+    shape: Shape = "circle"
+    series: str = ""
+    low_y: float = 0.0
+    high_y: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,8 @@ class _Axis:
     end: float
 
     def __call__(self, value: float) -> float:
+        if value <= 0.0:
+            return self.start
         share = (math.log10(value) - self.least) / (self.most - self.least)
         return self.start + min(max(share, 0.0), 1.0) * (self.end - self.start)
 
@@ -77,86 +84,56 @@ def pareto_front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
 
 def log_plot(
     points: Sequence[Point], title: str, x_label: str, y_label: str, *, labelled: bool = True
-) -> str:
-    """Return an SVG element; points with x or y not above 0 are put onto the axis.
+) -> Drawing | None:
+    """Return a plot, or None if there is nothing to show.
 
-    Points on the front are filled and joined by a line, others are rings. Labels that
-    find no place are left out; every point has its label as a tooltip.
+    Points with x or y not above 0 are put onto the axis. Points on the front are filled and
+    joined by a dashed line, others are rings. Labels that find no place are left out; every point
+    has its label as a tooltip.
     """
     xs = [p.x for p in points if p.x > 0.0]
     ys = [p.y for p in points if p.y > 0.0]
     if not xs or not ys:
-        return f"<p>{escape(title)}: there is nothing to show.</p>"
+        return None
     x = _Axis.around(xs, LEFT, WIDTH - RIGHT)
     y = _Axis.around(ys, HEIGHT - BOTTOM, TOP)
-    parts = [
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" '
-        f'width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="{escape(title)}" '
-        'font-family="sans-serif" font-size="11" fill="currentColor">'
-    ]
-    parts += _axes(x, y, x_label, y_label)
-
-    def place(point: Point) -> tuple[float, float]:
-        return (
-            x(point.x) if point.x > 0.0 else x.start,
-            y(point.y) if point.y > 0.0 else y.start,
-        )
-
-    front = sorted(place(p) for p in points if p.on_front)
+    parts = _axes(x, y, x_label, y_label)
+    for name in dict.fromkeys(p.series for p in points if p.series):
+        chain = [p for p in points if p.series == name]
+        places = tuple((x(p.x), y(p.y)) for p in chain)
+        parts.append(Line(places, chain[0].colour, 0.35))
+    front = tuple(sorted((x(p.x), y(p.y)) for p in points if p.on_front))
     if len(front) > 1:
-        line = " ".join(f"{px:.1f},{py:.1f}" for px, py in front)
-        parts.append(
-            f'<polyline points="{line}" fill="none" stroke="currentColor" stroke-opacity="0.45" '
-            'stroke-width="1.5" stroke-dasharray="5 3"/>'
-        )
-    taken = [(px - 5.0, py - 5.0, px + 5.0, py + 5.0) for px, py in map(place, points)]
+        parts.append(Line(front, opacity=0.5, width=1.5, dash=5.0))
+    taken = [(x(p.x) - 5.0, y(p.y) - 5.0, x(p.x) + 5.0, y(p.y) + 5.0) for p in points]
     for point in sorted(points, key=lambda p: not p.on_front):  # the front is labelled first
-        px, py = place(point)
-        fill = point.colour if point.on_front else "none"
+        px, py = x(point.x), y(point.y)
         if point.low > 0.0 and point.high > point.low:
-            parts.append(
-                f'<line x1="{x(point.low):.1f}" x2="{x(point.high):.1f}" y1="{py:.1f}" '
-                f'y2="{py:.1f}" stroke="{point.colour}" stroke-opacity="0.6"/>'
-            )
+            parts.append(Line(((x(point.low), py), (x(point.high), py)), point.colour, 0.5))
+        if point.low_y > 0.0 and point.high_y > point.low_y:
+            parts.append(Line(((px, y(point.low_y)), (px, y(point.high_y))), point.colour, 0.5))
         tip = f"{point.label}: {point.x:.4g}, {point.y:.3g}"
-        parts.append(
-            f'<circle cx="{px:.1f}" cy="{py:.1f}" r="4.5" fill="{fill}" stroke="{point.colour}" '
-            f'stroke-width="1.8"><title>{escape(tip)}</title></circle>'
-        )
+        parts.append(Mark(px, py, point.shape, point.colour, point.on_front, tip=tip))
         if labelled:
-            parts += _label(point.label, px, py, taken)
-    return "".join([*parts, "</svg>"])
+            parts += _label(point, px, py, taken)
+    return Drawing(WIDTH, HEIGHT, title, parts)
 
 
-def _axes(x: _Axis, y: _Axis, x_label: str, y_label: str) -> list[str]:
-    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
-    grid = 'stroke="currentColor" stroke-opacity="0.15"'
-    parts = []
+def _axes(x: _Axis, y: _Axis, x_label: str, y_label: str) -> list[Line | Mark | Words]:
+    right, bottom = float(WIDTH - RIGHT), float(HEIGHT - BOTTOM)
+    parts: list[Line | Mark | Words] = []
     for tick in x.ticks():
         at = x(tick)
-        parts.append(f'<line x1="{at:.1f}" x2="{at:.1f}" y1="{TOP}" y2="{bottom}" {grid}/>')
-        parts.append(
-            f'<text x="{at:.1f}" y="{bottom + 15}" text-anchor="middle">{_number(tick)}</text>'
-        )
+        parts.append(Line(((at, TOP), (at, bottom)), opacity=0.15))
+        parts.append(Words(at, bottom + 15.0, _number(tick), "middle", SIZE))
     for tick in y.ticks():
         at = y(tick)
-        parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{at:.1f}" y2="{at:.1f}" {grid}/>')
-        parts.append(
-            f'<text x="{LEFT - 6}" y="{at + 4:.1f}" text-anchor="end">{_number(tick)}</text>'
-        )
-    parts.append(
-        f'<rect x="{LEFT}" y="{TOP}" width="{right - LEFT}" height="{bottom - TOP}" fill="none" '
-        'stroke="currentColor" stroke-opacity="0.5"/>'
-    )
-    parts.append(
-        f'<text x="{(LEFT + right) / 2:.0f}" y="{HEIGHT - 10}" text-anchor="middle" '
-        f'font-size="12">{escape(x_label)}</text>'
-    )
-    middle = (TOP + bottom) / 2
-    parts.append(
-        f'<text transform="translate(14 {middle:.0f}) rotate(-90)" text-anchor="middle" '
-        f'font-size="12">{escape(y_label)}</text>'
-    )
+        parts.append(Line(((LEFT, at), (right, at)), opacity=0.15))
+        parts.append(Words(LEFT - 6.0, at + 4.0, _number(tick), "end", SIZE))
+    frame = ((LEFT, TOP), (right, TOP), (right, bottom), (LEFT, bottom), (LEFT, TOP))
+    parts.append(Line(tuple((float(a), float(b)) for a, b in frame), opacity=0.5))
+    parts.append(Words((LEFT + right) / 2.0, HEIGHT - 10.0, x_label, "middle", 12.0))
+    parts.append(Words(14.0, (TOP + bottom) / 2.0, y_label, "middle", 12.0, turned=True))
     return parts
 
 
@@ -167,10 +144,10 @@ def _number(value: float) -> str:
 Box = tuple[float, float, float, float]
 
 
-def _label(text: str, px: float, py: float, taken: list[Box]) -> list[str]:
+def _label(point: Point, px: float, py: float, taken: list[Box]) -> list[Words]:
     """Return the text beside a point where nothing is yet, and add its box to ``taken``."""
-    width = LETTER * len(text)
-    if not text:
+    width = LETTER * SIZE * len(point.label)
+    if not point.label:
         return []
     places = [
         (px + 8.0, py + 4.0), (px - 8.0 - width, py + 4.0), (px - width / 2.0, py - 8.0),
@@ -178,12 +155,12 @@ def _label(text: str, px: float, py: float, taken: list[Box]) -> list[str]:
         (px - 6.0 - width, py - 7.0), (px - 6.0 - width, py + 15.0),
     ]  # fmt: skip
     for left, base in places:
-        box = (left, base - LINE + 2.0, left + width, base + 2.0)
+        box = (left, base - SIZE + 1.0, left + width, base + 2.0)
         inside = box[0] >= LEFT and box[2] <= WIDTH - RIGHT
         inside = inside and box[1] >= TOP and box[3] <= HEIGHT - BOTTOM
         if inside and not any(_overlap(box, other) for other in taken):
             taken.append(box)
-            return [f'<text x="{left:.1f}" y="{base:.1f}">{escape(text)}</text>']
+            return [Words(left, base, point.label, size=SIZE)]
     return []
 
 

@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from app.cli.drawing import Drawing, Mark, svg_element
 from app.cli.html_page import facts_table, html_page, sortable_table
-from app.cli.log_plot import Point, log_plot
+from app.cli.report_parts import Row
+from app.cli.report_pictures import FULL_COLOUR, OTHER, STANDARD, Pictures
+from app.cli.report_plots import (
+    EVALUATIONS,
+    STYLES,
+    TIME,
+    scene_plot,
+    style_of,
+    summary_plot,
+    summary_rows,
+)
 from app.plan_rows import format_bytes
-
-Row = dict[str, Any]
-"""One measured scene and technique: what a line of ``results.csv`` holds, by column."""
-
-COLOURS = {
-    "ltc": "#2f81f7",
-    "ggx": "#e8590c",
-    "adaptive": "#2f9e44",
-    "adaptive-extrapolated": "#12a5a5",
-    "uniform": "#ae4ad6",
-}
-"""By a technique's bare name; each at least 3:1 against white and against black."""
-
-OTHER_COLOUR = "#868e96"
 
 COLUMNS = (
     ("technique", "technique"),
     ("lighting [ms]", "lighting_ms"),
     ("wall [ms]", "wall_ms"),
     ("evaluations", "evaluations"),
-    ("bytes", "bytes"),
+    ("tables", "table_bytes"),
+    ("bytes in all", "bytes"),
     ("specular to GGX: mean", "specular_ggx_mean"),
     ("p95", "specular_ggx_p95"),
     ("max", "specular_ggx_max"),
@@ -39,24 +36,33 @@ COLUMNS = (
     ("max", "specular_own_max"),
     ("diffuse: mean", "diffuse_mean"),
     ("max", "diffuse_max"),
+    ("picture", "picture_share"),
 )
 """Heading and key of the tables' columns; ``results.csv`` has more."""
 
+ABOUT = (
+    "<p>What each technique costs, and how far its picture is from the truth: errors are the "
+    "absolute differences at random pixels of radiance from the exact integral of GGX, in float64 "
+    "along the very outlines, for lights of radiance 1 on a white material (F = 1, albedo 1). The "
+    "error to a technique's <em>own integral</em>, that of the lobe which its table fits, leaves "
+    "out what the fitted lobe itself errs. <em>Picture</em> is the mean difference of the "
+    f"scene's own picture from {STANDARD}, over its mean. Filled points are on the Pareto front: "
+    "no other technique is both faster and more exact. Whiskers span the quartiles of the "
+    "time.</p>"
+)
 
-@dataclass(frozen=True)
-class Pictures:
-    """A crop of what a technique renders, and its difference, as ``data:`` addresses."""
-
-    picture: str
-    difference: str
+ABOUT_PICTURES = (
+    f"Where {OTHER} differs most from {STANDARD}: left the picture, right its difference from "
+    f"{STANDARD}, which itself is within a few 1e-4 of GGX; orange is too bright, blue too dark, "
+    f"in full colour at {FULL_COLOUR:.0%} of the crop's median radiance."
+)
 
 
 def report_page(
     rows: Sequence[Row],
-    pictures: dict[tuple[str, str], Pictures],
-    machine: dict[str, str],
-    settings: dict[str, Any],
-    about_pictures: str,
+    pictures: Mapping[tuple[str, str], Pictures],
+    machine: Mapping[str, str],
+    settings: Mapping[str, Any],
 ) -> str:
     """Return the whole page.
 
@@ -64,108 +70,114 @@ def report_page(
     ----------
     rows : sequence of Row
         In the order in which they shall stand.
-    pictures : dict of Pictures
+    pictures : mapping of Pictures
         By scene and technique.
-    machine, settings : dict
+    machine, settings : mapping
         Names and values for the tables at the top.
-    about_pictures : str
-        A sentence on what the differences show.
     """
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    clocks = sorted({row["timing"] for row in rows})
-    body = [
-        "<h1>Error against run time</h1>",
-        "<p>What each technique costs, and how far its picture is from the truth: errors are the "
-        "absolute differences at random pixels of radiance from the exact integral of GGX, in "
-        "float64 along the very outlines, for lights of radiance 1 on a white material (F = 1, "
-        "albedo 1). The error to a technique's <em>own integral</em>, that of the lobe which its "
-        "table fits, leaves out what the fitted lobe itself errs. Where materials are anisotropic, "
-        "errors are those of the isotropic lobe of the same area. Filled points are on the Pareto "
-        "front: no other technique is both faster and more exact. Whiskers span the quartiles of "
-        "the time.</p>",
-        f"<p>Times are medians per pass by {escape(' and '.join(clocks))}"
-        + (
-            ", because this renderer's timer queries are not to be trusted: each pass ends with "
-            "glFinish, so they contain what else the machine does."
-            if "wall clock" in clocks
-            else "."
-        )
-        + " A pixel's <em>evaluations</em> of the integral along the outlines depend on no "
-        "machine, but one of another technique is other work. All numbers are in "
-        "<code>results.csv</code> and <code>results.json</code>.</p>",
-        facts_table({**machine, **{name: str(value) for name, value in settings.items()}}),
-    ]
+    facts = {**machine, **{name: str(value) for name, value in settings.items()}}
+    body = ["<h1>Error against run time</h1>", ABOUT, _about_times(rows), facts_table(facts)]
     if len(scenes) > 1:
-        body += ["<h2>All scenes</h2>", '<div class="side">', _plot_all(rows), "</div>", _legend()]
+        body += _summary(rows)
+        links = ", ".join(f"<b>{escape(scene)}</b>" for scene in scenes)
+        body.append(f"<p>Below, scene by scene: {links}.</p>")
     for scene in scenes:
-        some = [row for row in rows if row["scene"] == scene]
-        body.append(f"<h2>{escape(scene)}</h2>")
-        body.append('<div class="side">')
-        for lobe, meaning in (("ggx", "GGX"), ("own", "its own integral")):
-            body.append(_figure(_plot(some, "lighting_ms", lobe), f"Against {meaning}, by time"))
-        body.append(_figure(_plot(some, "evaluations", "ggx"), "Against GGX, by evaluations"))
-        body += ["</div>", _legend(some), _table(some)]
-        body.append(f"<h3>Pictures</h3><p>{escape(about_pictures)}</p>")
-        body.append('<div class="side">')
-        for row in some:
-            seen = pictures[scene, row["technique"]]
-            name = escape(row["technique"])
-            body.append(
-                f'<figure><div class="side" style="gap:2px"><img src="{seen.picture}" '
-                f'alt="{name}"><img src="{seen.difference}" alt="difference of {name}"></div>'
-                f"<figcaption>{name}, difference</figcaption></figure>"
-            )
-        body.append("</div>")
+        body += _scene(scene, [row for row in rows if row["scene"] == scene], pictures)
     return html_page("Error against run time", body)
 
 
-def _colour(technique: str) -> str:
-    return COLOURS.get(technique.partition(":")[0], OTHER_COLOUR)
-
-
-def _points(rows: Sequence[Row], x: str, lobe: str, label: str, front: bool) -> list[Point]:
-    points = []
-    for row in rows:
-        error, cost = row[f"specular_{lobe}_mean"], row.get(x)
-        if error is None or cost is None:
-            continue
-        is_time = x.endswith("_ms")
-        low, high = (row[f"{x[:-3]}_{q}_ms"] if is_time else cost for q in ("q1", "q3"))
-        on_front = front and bool(row[f"on_front_{lobe}"])
-        name = label.format(**row)
-        points.append(Point(cost, error, name, _colour(row["technique"]), low, high, on_front))
-    return points
-
-
-AXES = {"lighting_ms": "lighting pass [ms]", "evaluations": "evaluations per pixel"}
-
-
-def _plot(rows: Sequence[Row], x: str, lobe: str) -> str:
-    # The front is that of times; evaluations of different techniques are not the same work.
-    points = _points(rows, x, lobe, "{technique}", front=x == "lighting_ms")
-    title = f"{rows[0]['scene']}: mean specular error by {AXES[x]}"
-    return log_plot(points, title, AXES[x], "mean specular error")
-
-
-def _plot_all(rows: Sequence[Row]) -> str:
-    label = "{technique}, {scene}"
-    points = _points(rows, "lighting_ms", "ggx", label, front=False)
-    plot = log_plot(
-        points, "all scenes", AXES["lighting_ms"], "mean specular error", labelled=False
+def _about_times(rows: Sequence[Row]) -> str:
+    clocks = sorted({row["timing"] for row in rows})
+    uncertain = max((row["truth_uncertainty"] for row in rows), default=0.0)
+    text = f"<p>Times are medians per pass by {escape(' and '.join(clocks))}"
+    if "wall clock" in clocks:
+        text += (
+            ", because this renderer's timer queries are not to be trusted: each pass ends with "
+            "glFinish, so they contain what else the machine does"
+        )
+    if "processor time" in clocks:
+        text += (
+            ", what this process took of all processors together, because this renderer's timer "
+            "queries are not to be trusted and the machine did other things too"
+        )
+    if any("llvmpipe" in row["renderer"] for row in rows):
+        text += (
+            ". <b>This is a software rasteriser: its times are those of a processor, not of a "
+            "GPU</b>"
+        )
+    return text + (
+        ". Of a technique that samples they are those of all its samples: <code>reference:64</code>"
+        " is 64 samples a pixel, and its error is their noise. A pixel's <em>evaluations</em> of "
+        "the integral along the outlines depend on no machine, but one of another technique is "
+        "other work. The exact integrals differ from finer ones, at every eighth of their points, "
+        f"by {uncertain:.0e} at most; no error below that means anything. All numbers are in "
+        "<code>results.csv</code> and <code>results.json</code>.</p>"
     )
-    return _figure(plot, "Every scene and technique, against GGX, by time")
 
 
-def _figure(picture: str, caption: str) -> str:
+def _summary(rows: Sequence[Row]) -> list[str]:
+    found = summary_rows(rows)
+    if not found:
+        return []
+    heads = ("technique", "lighting [ms]", "error to GGX", "least of a scene", "most of a scene")
+    lines = []
+    for row in found:
+        cells = "".join(
+            f'<td data-value="{row[key]!r}">{form(row[key])}</td>'
+            for key, form in (
+                (TIME, _milliseconds), ("error", _small), ("least", _small), ("most", _small),
+            )
+        )  # fmt: skip
+        front = ' class="front"' if row["on_front"] else ""
+        lines.append(f"<tr{front}><td>{escape(row['technique'])}</td>{cells}</tr>")
+    return [
+        "<h2>All scenes</h2>",
+        f"<p>Geometric means over the {found[0]['scenes']} scenes; what is the "
+        "same as ltc where nothing is curved counts as that there.</p>",
+        '<div class="side">',
+        _figure(summary_plot(rows), "Mean error to GGX by time of the lighting pass"),
+        "</div>",
+        _legend([row["technique"] for row in found]),
+        sortable_table(heads, lines),
+    ]
+
+
+def _scene(
+    scene: str, rows: Sequence[Row], pictures: Mapping[tuple[str, str], Pictures]
+) -> list[str]:
+    body = [f"<h2>{escape(scene)}</h2>", '<div class="side">']
+    for lobe, meaning in (("ggx", "GGX"), ("own", "its own integral")):
+        body.append(_figure(scene_plot(rows, TIME, lobe), f"Against {meaning}, by time"))
+    body.append(_figure(scene_plot(rows, EVALUATIONS, "ggx"), "Against GGX, by evaluations"))
+    body += ["</div>", _legend([row["technique"] for row in rows]), _table(rows)]
+    body.append(f"<h3>Pictures</h3><p>{escape(ABOUT_PICTURES)}</p>")
+    body.append('<div class="side">')
+    for row in rows:
+        seen = pictures[scene, row["technique"]]
+        name = escape(row["technique"])
+        body.append(
+            f'<figure><div class="side" style="gap:2px"><img src="{seen.picture}" '
+            f'alt="{name}"><img src="{seen.difference}" alt="difference of {name}"></div>'
+            f"<figcaption>{name}, difference</figcaption></figure>"
+        )
+    return [*body, "</div>"]
+
+
+def _figure(plot: Drawing | None, caption: str) -> str:
+    picture = "<p>There is nothing to show.</p>" if plot is None else svg_element(plot)
     return f"<figure>{picture}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
-def _legend(rows: Sequence[Row] = ()) -> str:
-    names = list(dict.fromkeys(row["technique"].partition(":")[0] for row in rows)) or [*COLOURS]
-    keys = " &nbsp; ".join(
-        f'<span style="color:{_colour(name)}">&#9679;</span> {escape(name)}' for name in names
-    )
-    return f"<p>{keys}</p>"
+def _legend(techniques: Sequence[str]) -> str:
+    found = {technique.partition(":")[0] for technique in techniques}
+    names = [*(name for name in STYLES if name in found), *sorted(found - set(STYLES))]
+    keys = []
+    for name in names:
+        colour, shape = style_of(name)
+        key = svg_element(Drawing(12, 12, name, [Mark(6, 6, shape, colour, True, 4.0)]))
+        keys.append(f"{key} {escape(name)}")
+    return f"<p>{' &nbsp; '.join(keys)}</p>"
 
 
 def _table(rows: Sequence[Row]) -> str:
@@ -179,15 +191,25 @@ def _table(rows: Sequence[Row]) -> str:
     return f"{table}<p>Click a heading to sort; bold techniques are on the front.</p>"
 
 
+def _milliseconds(value: float) -> str:
+    return f"{value:.3f}" if value < 10.0 else f"{value:.1f}"
+
+
+def _small(value: float) -> str:
+    return f"{value:.1e}"
+
+
 def _cell(key: str, value: Any) -> str:
     if value is None:
         return '<td data-value="Infinity">–</td>'
     if isinstance(value, str):
         return f"<td>{escape(value)}</td>"
-    if key == "bytes":
+    if key.endswith("bytes"):
         text = format_bytes(int(value))
+    elif key == "picture_share":
+        text = f"{value:.3%}"
+    elif key.startswith(("specular", "diffuse")):
+        text = _small(value)
     else:
-        text = f"{value:.1e}" if key.startswith(("specular", "diffuse")) else f"{value:.3g}"
-        if key.endswith("_ms") or key == "evaluations":
-            text = f"{value:.3f}" if value < 10.0 else f"{value:.1f}"
+        text = _milliseconds(value)
     return f'<td data-value="{value!r}">{text}</td>'

@@ -30,7 +30,7 @@ from app.render.programs import Programs
 from app.render.sampling import pixel_offset
 from app.render.state import begin_pass, release_framebuffer
 from app.render.techniques import find_technique, suited_technique, technique_of
-from app.render.timers import PassTimers
+from app.render.timers import Clock, PassTimers
 from app.scene import Display, PixelView, RenderSettings, Scene, Shot, Vec3
 
 
@@ -475,7 +475,7 @@ class Renderer:
         untrusted = self._timers.source == "timer queries" and not any(figures.values())
         if figures and untrusted and self._seen is not None:
             shot = self._seen.shot
-            self._timers.use_wall_clock()
+            self._timers.use_clock("wall clock")
             self.render(replace(shot, settings=replace(shot.settings, samples=1)))
             _ = self.texture
             figures = self._timers.milliseconds()
@@ -483,12 +483,12 @@ class Renderer:
 
     @property
     def timing_source(self) -> str:
-        """``"timer queries"`` or ``"wall clock"``."""
+        """``"timer queries"``, ``"wall clock"`` or ``"processor time"``."""
         return self._timers.source
 
-    def use_wall_clock(self) -> None:
-        """Time passes by the wall clock, each with a glFinish, from now on."""
-        self._timers.use_wall_clock()
+    def use_clock(self, clock: Clock) -> None:
+        """Time passes by the wall clock or by this process's own time, each with a glFinish."""
+        self._timers.use_clock(clock)
 
     def plan(self, shot: Shot) -> Plan:
         """Return what rendering ``shot`` compiles, allocates and loads, and why."""

@@ -24,6 +24,9 @@ from ltc.table import sample_textures
 FloatArray = NDArray[np.float64]
 Lobe: TypeAlias = Literal["ltc", "ggx"]
 
+FINER = (12, 1e-8)
+"""Nodes and tolerance of `ltc.reference.specular_integral_batch`."""
+
 BATCH = 512
 """Points at once: thousands of them with hundreds of curves would fill the memory."""
 
@@ -72,6 +75,7 @@ def exact_radiance(
     alpha: ArrayLike,
     lobe: Lobe = "ltc",
     tangent: ArrayLike | None = None,
+    finer: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     """Return what points of a white material send to their viewers.
 
@@ -85,6 +89,9 @@ def exact_radiance(
         The fitted lobe, or GGX itself.
     tangent : (n, 3) float, optional
         Along which the first alpha acts. With it the fitted lobe is that of the anisotropic table.
+    finer : bool
+        Whether GGX is integrated with more nodes and a smaller tolerance, to see what those
+        otherwise used err.
 
     Returns
     -------
@@ -124,7 +131,9 @@ def exact_radiance(
             if lobe == "ltc":
                 share = gain * curved_outline.ltc_form_factor(inverse, contours).value
             else:
-                share, _ = curve_specular_integral_batch(contours, local, ax, ay)
+                share, _ = curve_specular_integral_batch(
+                    contours, local, ax, ay, *(FINER if finer else ())
+                )
             lambert = curved_outline.form_factor(contours).value
             specular[part] += np.maximum(sign * share, 0.0)[:, None] * light.radiance
             diffuse[part] += np.maximum(sign * lambert, 0.0)[:, None] * light.radiance

@@ -90,7 +90,7 @@ def forbidden(name: str) -> set[str]:
         return {"app"} | GL | GUI
     if name in PURE:
         return {"app.render", "app.context", "app.panels"} | WINDOW | GL | GUI
-    if name.startswith("app.render"):
+    if name.startswith(("app.render", "app.measure")):
         return (
             {"app.panels", "app.editor", "app.edits", "app.gui.documents", "moderngl_window"}
             | WINDOW
@@ -106,7 +106,7 @@ def forbidden(name: str) -> set[str]:
 
 
 def test_every_module_has_its_layer() -> None:
-    packages = ("ltc", "app.render", "app.panels", "app.cli")
+    packages = ("ltc", "app.render", "app.measure", "app.panels", "app.cli")
     known = PURE | WINDOW | TOP | {"app", "app.context", "app.gui"}
     homeless = {name for name in MODULES if name not in known and not name.startswith(packages)}
     assert not homeless

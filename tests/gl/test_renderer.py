@@ -568,7 +568,7 @@ def test_timings(renderer: Renderer) -> None:
         renderer.display()
         assert set(renderer.timings(wait=False)) == set(figures)
     assert renderer.timings(wait=False) != figures
-    renderer.use_wall_clock()
+    renderer.use_clock("wall clock")
     renderer.render(shot(one_light(), 1, 320, 180))
     renderer.display()
     assert renderer.timing_source == "wall clock"

@@ -1,0 +1,1 @@
+"""What measuring commands and the window's panel have in common: entries, errors, times."""
