@@ -25,6 +25,7 @@ from app.cli.bench import bench
 from app.cli.common import FailureError, messages, scene_path
 from app.cli.compare import compare
 from app.cli.explain import explain
+from app.cli.lobe import lobe
 from app.cli.probe import probe
 from app.cli.report import report
 from app.cli.shot import shot
@@ -140,6 +141,7 @@ app.command()(probe)
 app.command()(bench)
 app.command()(report)
 app.command()(compare)
+app.command()(lobe)
 app.command()(explain)
 
 

@@ -24,7 +24,7 @@ PURE = {
     "app.gui.file_types",
     "app.loops", "app.text", "app.text_runs", "app.svg", "app.svg_paths", "app.svg_tree",
     "app.json_reader", "app.json_writer", "app.light_io", "app.plan_rows",
-    "app.colour_maps", "app.lobe_picture",
+    "app.colour_maps", "app.lobe_picture", "app.lobe_figure",
 }  # fmt: skip
 WINDOW = {
     "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",
