@@ -208,7 +208,9 @@ class _Run:
             for source in spec.sources(self._renderer.programs.roots):
                 digest.update(source.text.encode())
         if needs.lighting.reads_tables:
-            for texels in table_textures(needs.lighting.tangents).values():
+            for texels in table_textures(
+                needs.lighting.anisotropic, needs.lighting.residual_size
+            ).values():
                 digest.update(texels.tobytes())
         drawn, clock = digest.hexdigest(), self._renderer.timing_source
         return {

@@ -1,8 +1,8 @@
 """What can be measured against each other: techniques, and random ones by samples.
 
-An entry is written as a technique is, ``ltc`` or ``uniform:30``. A technique that samples takes no
-number of its own, and here its number is the samples of a pixel: ``reference:64`` is what 64
-samples give, in the time that 64 take.
+An entry is written as a technique is, ``ltc``, ``uniform:30`` or ``ltc/table-8``. A technique
+that samples takes no number of its own, and here its number is the samples of a pixel:
+``reference:64`` is what 64 samples give, in the time that 64 take.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from app.render.pack import has_curves
 from app.render.techniques import (
     AUTOMATIC,
     TECHNIQUES,
+    VARIANTS,
     Technique,
     find_technique,
     parse_technique,
@@ -27,7 +28,10 @@ CURVED = (
     "adaptive", "adaptive-extrapolated", "uniform:6", "uniform:18", "uniform:30", "uniform:96",
 )  # fmt: skip
 """What differs from ``ltc`` only where outlines have curves, as ``ltc``'s own number does."""
+TABLES = ("ltc/no-table", "ltc/table-4", "ltc/table-8", "ltc/table-32")
+"""Of the isotropic table: what an anisotropic scene looks up has one size."""
 OTHERS = (
+    "ltc/undivided", "ltc/published-clip",
     "representative-point",
     "reference:1", "reference:4", "reference:16", "reference:64", "reference:256",
 )  # fmt: skip
@@ -48,7 +52,7 @@ class Entry:
     @property
     def name(self) -> str:
         """The technique's bare name."""
-        return self.technique.partition(":")[0]
+        return parse_technique(self.technique).name
 
     @property
     def number(self) -> int:
@@ -57,9 +61,15 @@ class Entry:
             self.samples if self.known.is_sampled else parse_technique(self.technique).number or 0
         )
 
-    def place(self) -> tuple[int, int]:
+    @property
+    def variant(self) -> str:
+        """The variant of its technique, empty for none."""
+        return parse_technique(self.technique).variant
+
+    def place(self) -> tuple[int, int, int]:
         """Return where it stands among others: in the order of help, then of numbers."""
-        return [*TECHNIQUES].index(self.name), self.number
+        variant = [*VARIANTS].index(self.variant) if self.variant else -1
+        return [*TECHNIQUES].index(self.name), variant, self.number
 
     def settings(self, samples: int | None = None, view: PixelView = "radiance") -> RenderSettings:
         """Return settings that render it, with other samples if those are given."""
@@ -103,12 +113,13 @@ def entries_of(scene: Scene, wanted: Sequence[str] = ()) -> tuple[Entry, ...]:
     used = scene.object_materials()
     anisotropic = any(m.is_anisotropic and any(m.f0) for m in used)
     curved = has_curves(scene.lights)
-    names = wanted or (*NUMBERS, *CURVED, *OTHERS)
+    names = wanted or (*NUMBERS, *CURVED, *(() if anisotropic else TABLES), *OTHERS)
     found = []
     for name in names:
         resolved = suited_technique(name, anisotropic) if name == AUTOMATIC else name
         entry = parse_entry(resolved)
         # Without curves these are the very programs of "ltc".
+        choice = parse_technique(entry.technique)
         alike = not curved and entry.known.has_tables and not wanted
-        found.append(Entry("ltc") if alike else entry)
+        found.append(Entry(str(choice.without_curves)) if alike else entry)
     return tuple(sorted(dict.fromkeys(found), key=Entry.place))

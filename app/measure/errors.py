@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.measure.entries import Entry
+from app.render.techniques import parse_technique
 from app.render.truth import Lobe, exact_radiance, shading_frames
 from app.scene import AreaLight, RenderSettings, Scene, Shot
 
@@ -117,7 +118,7 @@ def choose_points(renderer: Renderer, scene: Scene, count: int) -> SurfacePoints
 def own_lobe(entry: Entry) -> Lobe | None:
     """Return the lobe whose integral a technique approximates, None if it has no such aim."""
     if entry.known.has_tables:
-        return "ltc"
+        return str(parse_technique(entry.technique).without_curves)
     return None if entry.name == "representative-point" else "ggx"
 
 

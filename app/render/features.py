@@ -131,7 +131,7 @@ class LightNeeds:
         choice = parse_technique(wanted)
         alike = choice.follows_ltc and self.curves != "whole"
         if alike or (choice.name == DEFAULT_TECHNIQUE and self.curves != "tree"):
-            return DEFAULT_TECHNIQUE
+            return str(choice.without_curves)
         return wanted
 
     def defines(self) -> dict[str, int]:
@@ -235,6 +235,11 @@ class LightingFeatures:
         return self.specular and find_technique(self.technique).has_tables
 
     @property
+    def residual_size(self) -> int | None:
+        """Texels on each axis of the residual's texture where a variant has its own number."""
+        return parse_technique(self.technique).changes.residual
+
+    @property
     def shades(self) -> bool:
         """Whether any surface reflects any light."""
         return self.specular or self.diffuse
@@ -282,6 +287,8 @@ def technique_defines(technique: str, anisotropic: bool) -> dict[str, int]:
         "ALBEDO_AZIMUTHS": azimuths[1],
         "CURVE_RULE": choice.technique.curve_rule,
         "CURVE_NODES": choice.curve_nodes,
+        "DIVIDES_BY_ABOVE": int(choice.changes.divides),
+        "CUTS_AT_LOBE": int(choice.changes.cuts_at_lobe),
     }
     if choice.name == "ggx" and choice.number is not None:
         defines["GGX_NODES"] = choice.number

@@ -59,6 +59,7 @@ class LightingPass:
         self._lights = TexelStorage(ctx, "light", "Lights")
         self._materials = TexelStorage(ctx, "material", "Materials")
         self._tables: dict[str, moderngl.Texture | moderngl.TextureArray] = {}
+        self._tables_hold: tuple[bool, int | None] = (False, None)
         self._triangle = FullScreenTriangle(ctx)
         self._light_count = 0
 
@@ -87,12 +88,13 @@ class LightingPass:
                 texture.release()
             self._tables.clear()
 
-    def load_tables(self, anisotropic: bool) -> None:
-        """Hold the technique's tables, of isotropic lobes or of all, and no others."""
-        wanted = table_textures(anisotropic)
-        if self._tables.keys() == wanted.keys():
+    def load_tables(self, anisotropic: bool, residual: int | None) -> None:
+        """Hold the technique's tables, as `table_textures` returns them, and no others."""
+        if self._tables and self._tables_hold == (anisotropic, residual):
             return
         self.drop(tables=True)
+        self._tables_hold = (anisotropic, residual)
+        wanted = table_textures(anisotropic, residual)
         for name, texels in wanted.items():
             texture: moderngl.Texture | moderngl.TextureArray
             *layers, height, width, channels = texels.shape
@@ -233,7 +235,7 @@ class LightingPass:
             for name, storage in (("lights", self._lights), ("materials", self._materials))
             if storage.bytes
         }
-        for name, texels in table_textures("table_residual_2" in self._tables).items():
+        for name, texels in table_textures(*self._tables_hold).items():
             if name in self._tables:
                 held[name] = int(texels.nbytes)
         return held

@@ -205,7 +205,7 @@ def _tables(features: LightingFeatures) -> Iterator[tuple[str, str, int]]:
     """Yield name, form and bytes of each table."""
     if not features.reads_tables:
         return
-    for name, texels in table_textures(features.anisotropic).items():
+    for name, texels in table_textures(features.anisotropic, features.residual_size).items():
         form = f"{texels.dtype} texture, {' x '.join(str(n) for n in texels.shape)}"
         yield name, form, int(texels.nbytes)
 

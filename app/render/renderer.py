@@ -29,7 +29,12 @@ from app.render.post import DisplayPass
 from app.render.programs import Programs
 from app.render.sampling import pixel_offset
 from app.render.state import begin_pass, release_framebuffer
-from app.render.techniques import find_technique, suited_technique, technique_of
+from app.render.techniques import (
+    find_technique,
+    parse_technique,
+    suited_technique,
+    technique_of,
+)
 from app.render.timers import Clock, PassTimers
 from app.scene import Display, PixelView, RenderSettings, Scene, Shot, Vec3
 
@@ -448,7 +453,8 @@ class Renderer:
             return {"specular": zero, "diffuse": zero.copy()}
         self._hold_lights(scene, needs)
         if find_technique(technique).has_tables:
-            self._lighting.load_tables(anisotropic)
+            residual = parse_technique(technique).changes.residual
+            self._lighting.load_tables(anisotropic, residual)
         samples = settings.samples if find_technique(technique).is_sampled else 1
         specular, diffuse = self._lighting.probe(
             needs, technique, anisotropic, **arrays, samples=samples
@@ -562,7 +568,7 @@ class Renderer:
         if features.shades:
             self._hold_materials(scene, features.uniform_materials)
         if features.reads_tables:
-            self._lighting.load_tables(features.anisotropic)
+            self._lighting.load_tables(features.anisotropic, features.residual_size)
         self._lighting.drop(
             lights=not features.lit,
             materials=not features.shades,

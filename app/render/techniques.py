@@ -1,8 +1,10 @@
 """The techniques that shade, by the names that users type.
 
 A name may be followed by a number, ``uniform:30``: what it means and from where to where it
-goes is the technique's own. Within the renderer a technique is its canonical text, without the
-number where that is the default (`suited_technique`), so that equal texts are equal programs.
+goes is the technique's own. Behind a stroke ``ltc`` takes a variant, ``ltc/table-8``: choices
+within it that are there to be measured, not to be used. Within the renderer a technique is its
+canonical text, without the number where that is the default (`suited_technique`), so that equal
+texts are equal programs.
 
 To add one: a line here, its entry function in ``shaders/``, and a feature in
 `app.render.features` that selects it.
@@ -124,6 +126,47 @@ TECHNIQUES: dict[str, Technique] = {
 }
 """By name, in the order in which help lists them."""
 
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """What is done otherwise than in ``ltc``.
+
+    Attributes
+    ----------
+    description : str
+        For ``--technique help``.
+    residual : int, optional
+        Texels on each axis of the residual's texture, 0 for no residual: the closed-form guess.
+    divides : bool
+        Whether what is cut off below the surface is made up for.
+    cuts_at_lobe : bool
+        Whether lights are cut at the lobe's own horizon instead of the surface's.
+    """
+
+    description: str
+    residual: int | None = None
+    divides: bool = True
+    cuts_at_lobe: bool = False
+
+
+VARIANTS: dict[str, Variant] = {
+    "no-table": Variant("the closed-form guess alone, without the fitted residual", residual=0),
+    "table-4": Variant("the residual in 4 x 4 texels instead of 16 x 16", residual=4),
+    "table-8": Variant("the residual in 8 x 8 texels", residual=8),
+    "table-32": Variant("the residual in 32 x 32 texels", residual=32),
+    "undivided": Variant(
+        "cut at the surface's horizon, but not divided by the share of the lobe above it",
+        divides=False,
+    ),
+    "published-clip": Variant(
+        "as published: cut at the lobe's own horizon, so that light leaks in from below the "
+        "surface",
+        divides=False,
+        cuts_at_lobe=True,
+    ),
+}
+"""Of ``ltc``, to measure what its choices are worth."""
+
 AUTOMATIC = "auto"
 """Stands for `suited_technique`."""
 
@@ -138,6 +181,17 @@ class Choice(NamedTuple):
 
     name: str
     number: int | None
+    variant: str = ""
+
+    @property
+    def changes(self) -> Variant:
+        """What its variant does otherwise."""
+        return VARIANTS[self.variant] if self.variant else Variant("")
+
+    @property
+    def without_curves(self) -> Choice:
+        """What is the same for outlines without curves, of ``ltc`` and those that follow it."""
+        return parse_technique(DEFAULT_TECHNIQUE)._replace(variant=self.variant)
 
     @property
     def technique(self) -> Technique:
@@ -169,7 +223,8 @@ class Choice(NamedTuple):
     def __str__(self) -> str:
         parameter = self.technique.parameter
         usual = parameter is None or parameter.default == self.number
-        return self.name if usual else f"{self.name}:{self.number}"
+        text = self.name if usual else f"{self.name}:{self.number}"
+        return f"{text}/{self.variant}" if self.variant else text
 
 
 def parse_technique(text: str) -> Choice:
@@ -180,6 +235,9 @@ def parse_technique(text: str) -> Choice:
     InputError
         If there is none of this name, saying which is nearest, or its number is wrong.
     """
+    text, stroke, variant = text.partition("/")
+    if stroke:
+        return _with_variant(parse_technique(text), variant)
     name, colon, number = text.partition(":")
     if name not in TECHNIQUES:
         known = (AUTOMATIC, *TECHNIQUES)
@@ -196,6 +254,20 @@ def parse_technique(text: str) -> Choice:
             f"a whole number from {parameter.least} to {parameter.most}"
         )
     return Choice(name, int(number))
+
+
+def _with_variant(choice: Choice, variant: str) -> Choice:
+    if choice.name != DEFAULT_TECHNIQUE:
+        raise InputError(
+            f"technique '{choice.name}' has no variants, found {quote('/' + variant)} behind it, "
+            f"expected them behind '{DEFAULT_TECHNIQUE}'"
+        )
+    if variant not in VARIANTS:
+        raise InputError(
+            f"technique '{choice.name}': the variant is {quote(variant)}, "
+            f"{expected_one_of(variant, VARIANTS)}"
+        )
+    return choice._replace(variant=variant)
 
 
 def find_technique(text: str) -> Technique:
@@ -246,5 +318,9 @@ def technique_lines() -> list[str]:
             continue
         span = f"{parameter.least} to {parameter.most}, {parameter.default} by default"
         rows.append((f"{name}[:N]", f"{technique.description}; N {parameter.meaning}, {span}"))
+    rows += [
+        (f"{DEFAULT_TECHNIQUE}/{name}", f"to measure: {variant.description}")
+        for name, variant in VARIANTS.items()
+    ]
     width = max(len(name) for name, _ in rows)
     return [f"{name:{width}}  {description}" for name, description in rows]

@@ -9,20 +9,22 @@ For ``ggx`` it is GGX itself (`ltc.curved_reference`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from app.outline import boundary
 from app.render.tables import anisotropic_table, isotropic_textures
+from app.render.techniques import parse_technique
 from app.scene import AreaLight
 from ltc import curved_outline, transform
 from ltc.curved_reference import curve_specular_integral_batch
 from ltc.table import sample_textures
 
 FloatArray = NDArray[np.float64]
-Lobe: TypeAlias = Literal["ltc", "ggx"]
+Lobe: TypeAlias = str
+"""``ggx``, GGX itself; or ``ltc``, the fitted lobe, or one of its variants, ``ltc/table-8``."""
 
 FINER = (12, 1e-8)
 """Nodes and tolerance of `ltc.reference.specular_integral_batch`."""
@@ -85,8 +87,8 @@ def exact_radiance(
         World space, as for `app.render.renderer.Renderer.probe`; views above the surface.
     alpha : (n,) or (n, 2) float
         GGX parameters; (n, 2) with ``tangent``.
-    lobe : {"ltc", "ggx"}
-        The fitted lobe, or GGX itself.
+    lobe : str
+        ``ltc``, the fitted lobe, one of its variants, or ``ggx``, GGX itself.
     tangent : (n, 3) float, optional
         Along which the first alpha acts. With it the fitted lobe is that of the anisotropic table.
     finer : bool
@@ -100,6 +102,7 @@ def exact_radiance(
     """
     p, n, wo = (np.asarray(a, dtype=np.float64) for a in (position, normal, view))
     a = np.asarray(alpha, dtype=np.float64)
+    changes = None if lobe == "ggx" else parse_technique(lobe).changes
     specular, diffuse = np.zeros((2, len(p), 3))
     for start in range(0, len(p), BATCH):
         part = slice(start, start + BATCH)
@@ -111,16 +114,18 @@ def exact_radiance(
             ax, ay = a[part].T
         local = np.einsum("nij,nj->ni", frames, wo[part])
         local[:, 2] = np.maximum(local[:, 2], 0.0)
-        if lobe == "ltc":
+        if changes is not None:
             if tangent is None:
                 cosine = np.minimum(local[:, 2], 1.0)
-                matrix, albedo, _ = sample_textures(isotropic_textures(), ax, cosine)
+                matrix, albedo, _ = sample_textures(
+                    isotropic_textures(changes.residual), ax, cosine
+                )
             else:
                 table = anisotropic_table()
                 matrix = table.matrix_of_view(ax, ay, local)
                 albedo, _ = table.albedo_terms_of_view(ax, ay, local)
             inverse = transform.invert(matrix)
-            gain = albedo / (1.0 - transform.leak(matrix))
+            gain = albedo / (1.0 - transform.leak(matrix)) if changes.divides else albedo
         for light in lights:
             if not any(light.radiance):
                 continue
@@ -128,7 +133,10 @@ def exact_radiance(
             away = np.cross(light.plane.u, light.plane.v)
             front = (p[part] - np.array(light.plane.origin)) @ away > 0.0
             sign = np.where(front, 1.0, -1.0) * (front | light.two_sided)
-            if lobe == "ltc":
+            if changes is not None and changes.cuts_at_lobe:
+                moved = [np.einsum("nij,nkcj->nkci", inverse, contour) for contour in contours]
+                share = gain * curved_outline.form_factor(moved).value
+            elif changes is not None:
                 share = gain * curved_outline.ltc_form_factor(inverse, contours).value
             else:
                 share, _ = curve_specular_integral_batch(

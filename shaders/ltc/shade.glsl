@@ -46,6 +46,9 @@ SurfacePoint surface_point(vec3 position, vec3 normal, vec3 tangent, vec3 wo, ve
 }
 #endif
 
+#if CUTS_AT_LOBE
+#include "ltc/published_clip.glsl"
+#else
 // Specular and diffuse form factors of a light at a point; both zero where it
 // shows its dark side.
 vec2 form_factors_at(PlanarLight light, SurfacePoint point, CosineTransform specular)
@@ -78,6 +81,7 @@ vec2 form_factors_at(PlanarLight light, SurfacePoint point, CosineTransform spec
 #endif
     return clamp(light_winding(view) * factors, 0.0, 1.0);
 }
+#endif
 
 // Radiance towards wo. `normal`, `tangent` and `wo` are unit and leave the surface; alpha.x
 // acts along the tangent.

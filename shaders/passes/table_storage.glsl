@@ -3,6 +3,14 @@
 #include "ltc/shade.glsl"
 #include "ltc/table.glsl"
 
+// What the lobe's integral over all directions that are lit is, of `above`, its share above the
+// surface.
+#if DIVIDES_BY_ABOVE
+float share_kept(float above) { return above; }
+#else
+float share_kept(float above) { return 1.0; }
+#endif
+
 #if TAKES_TANGENT
 #include "ltc/anisotropic.glsl"
 
@@ -21,7 +29,7 @@ SpecularLobe specular_lobe(SurfacePoint point)
     vec2 stored = table_quadrilinear(table_albedo, ALBEDO_AZIMUTHS, coordinates).rg;
     return SpecularLobe(
         cosine_transform(lobe, point.world_from_shading),
-        albedo_terms(stored, length(vec3(alpha, 1.0) * point.wo)) / lobe.above);
+        albedo_terms(stored, length(vec3(alpha, 1.0) * point.wo)) / share_kept(lobe.above));
 }
 #else
 #include "ltc/lobe.glsl"
@@ -40,6 +48,6 @@ SpecularLobe specular_lobe(SurfacePoint point)
     vec2 stored = table_bilinear(table_albedo, coordinates).rg;
     return SpecularLobe(
         cosine_transform(lobe, point.world_from_shading),
-        albedo_terms(stored, length(vec2(alpha * sin_theta, cos_theta))) / lobe.above);
+        albedo_terms(stored, length(vec2(alpha * sin_theta, cos_theta))) / share_kept(lobe.above));
 }
 #endif

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from app.cli.main import app, run
 from app.images import exr_bytes, png_bytes
-from app.render.techniques import TECHNIQUES
+from app.render.techniques import TECHNIQUES, VARIANTS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -714,7 +714,8 @@ def test_techniques_are_listed(command: str, capfd: pytest.CaptureFixture[str]) 
     out, err = capfd.readouterr()
     assert err == ""
     lines = out.splitlines()
-    assert [line.split()[0].removesuffix("[:N]") for line in lines] == ["auto", *TECHNIQUES]
+    names = [line.split()[0].removesuffix("[:N]") for line in lines]
+    assert names == ["auto", *TECHNIQUES, *(f"ltc/{variant}" for variant in VARIANTS)]
 
 
 def test_version(capfd: pytest.CaptureFixture[str]) -> None:

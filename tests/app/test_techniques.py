@@ -7,7 +7,13 @@ import re
 import pytest
 
 from app.errors import InputError
-from app.render.techniques import TECHNIQUES, parse_technique, suited_technique, technique_lines
+from app.render.techniques import (
+    TECHNIQUES,
+    VARIANTS,
+    parse_technique,
+    suited_technique,
+    technique_lines,
+)
 
 
 @pytest.mark.parametrize(
@@ -23,6 +29,8 @@ from app.render.techniques import TECHNIQUES, parse_technique, suited_technique,
         ("uniform:018", "uniform", 18, "uniform"),
         ("uniform:1", "uniform", 1, "uniform:1"),
         ("uniform:4096", "uniform", 4096, "uniform:4096"),
+        ("ltc:4/table-8", "ltc", 4, "ltc/table-8"),
+        ("ltc:2/undivided", "ltc", 2, "ltc:2/undivided"),
     ],
 )
 def test_names_and_numbers(text: str, name: str, number: int | None, canonical: str) -> None:
@@ -46,6 +54,10 @@ def test_names_and_numbers(text: str, name: str, number: int | None, canonical: 
         ("uniform:" + "9" * 5000, "expected a whole number"),
         ("ggx:5", 'number of quadrature nodes an edge is "5", expected a whole number from 1 to 4'),
         ("", "'' is unknown"),
+        ("ltc/tables-8", "variant is \"tables-8\".*did you mean 'table-8'"),
+        ("ltc/", 'variant is ""'),
+        ("ggx/undivided", "'ggx' has no variants"),
+        ("auto/undivided", "'auto' is unknown"),
         (":3", "'' is unknown"),
     ],
 )
@@ -57,8 +69,10 @@ def test_wrong_ones_are_told_in_a_sentence(text: str, words: str) -> None:
 
 def test_help_says_what_numbers_mean() -> None:
     lines = technique_lines()
-    assert [re.split(r"[\s\[]", line)[0] for line in lines] == ["auto", *TECHNIQUES]
-    for line, technique in zip(lines[1:], TECHNIQUES.values(), strict=True):
+    variants = [f"ltc/{name}" for name in VARIANTS]
+    names = [re.split(r"[\s\[]", line)[0] for line in lines]
+    assert names == ["auto", *TECHNIQUES, *variants]
+    for line, technique in zip(lines[1:], TECHNIQUES.values(), strict=False):
         assert ("[:N]" in line) == (technique.parameter is not None)
         if technique.parameter:
             assert technique.parameter.meaning in line
