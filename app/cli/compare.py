@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -26,19 +26,26 @@ from app.cli.common import (
 from app.colour_maps import SEQUENTIAL
 from app.errors import InputError, expected_one_of
 from app.images import IMAGE_SUFFIXES, check_image_path, read_image, save_image
+from app.render.breakdown import Breakdown, break_down
 from app.render.comparison import SAMPLED, Pictures, shared_samples
 from app.render.difference import (
     DIFFERENCE_VIEWS,
+    LUMINANCE,
     DifferenceView,
     Measure,
     Numbers,
     Scale,
     robust_high,
 )
+from app.render.gathering import Gathering, Points, check_breakdown, random_places
 from app.render.techniques import AUTOMATIC, find_technique, suited_technique, technique_of
 from app.render.tone_map import display_codes, linear_from_srgb, quantise
 from app.scene import MAX_SAMPLES, Display, RenderSettings, Shot
 
+if TYPE_CHECKING:
+    from app.render.renderer import Renderer
+
+MAX_POINTS = 100_000
 VIEWS = (*DIFFERENCE_VIEWS, "split", "a", "b")
 
 
@@ -97,6 +104,16 @@ def compare(
             parser=whole_number("--estimates", 1, MAX_SAMPLES),
         ),
     ] = SAMPLED,
+    count: Annotated[
+        int,
+        typer.Option(
+            "--breakdown",
+            metavar="N",
+            help="Tell at N random pixels which part of A's error is whose.",
+            parser=whole_number("--breakdown", 0, MAX_POINTS),
+            show_default=False,
+        ),
+    ] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> None:
     """Say how far a picture is from another technique's, or from another file.
@@ -106,6 +123,10 @@ def compare(
     told: mean, root of the mean square, percentiles and largest, as radiance and as shares
     of B's mean and of the brightest light. Where B is a random estimate, its own standard
     error stands beside them: what is not above it is noise.
+
+    --breakdown takes N random pixels and computes the radiance in float64 with one of A's
+    approximations after another: Fresnel's term apart from the lobe, the fitted lobe, the
+    table, the textures, the outline; what is left is float32's.
 
     -o writes a picture of --view: signed, absolute or relative difference or FLIP in
     false colours with their legend; both halves side by side (split); or one of the
@@ -117,6 +138,7 @@ def compare(
     \b
     Examples:
       ltc-viewer compare 06-grazing --technique ltc --against ggx:4 -o error.png
+      ltc-viewer compare 06-grazing --technique ltc --breakdown 100
       ltc-viewer compare mine.exr theirs.exr --view signed -o signed.png
     """
     chosen = _choices(view, measure, colours, high)
@@ -126,7 +148,9 @@ def compare(
     if is_picture:
         if second is None:
             raise InputError(f"{first}: this is one picture, expected two to compare, or a scene")
-        pictures = read_pictures(Path(first), Path(second))
+        if count:
+            raise InputError("--breakdown needs a scene, found two pictures")
+        pictures, parts = read_pictures(Path(first), Path(second)), None
     else:
         if second is not None:
             raise InputError(
@@ -136,18 +160,22 @@ def compare(
         width, height = image_size(size)
         for name in (technique, against):
             suited_technique(name, anisotropic=False)
+        if count:
+            check_breakdown(technique)
         scene = named_scene(first)
         shot = Shot(scene, RenderSettings(technique, samples), width, height)
-        pictures = render_pictures(shot, against, estimates)
+        pictures, parts = render_pictures(shot, against, estimates, count)
     found = pictures.numbers(chosen.measure)
     seen = pictures.flip() if view == "flip" or as_json or output is None else None
     mean_flip = None if seen is None else float(seen.mean())
     if output is not None:
         save_image(_picture(pictures, found, view, chosen, seen), output)
     if as_json:
-        typer.echo(json.dumps(_json(pictures, found, mean_flip), indent=2))
+        typer.echo(json.dumps(_json(pictures, found, mean_flip, parts), indent=2))
     else:
         results().print(numbers_table(pictures, found, mean_flip))
+        if parts is not None:
+            results().print(breakdown_table(parts))
         if output is not None:
             typer.echo(output)
 
@@ -198,7 +226,9 @@ def _shown(radiance: NDArray[Any]) -> NDArray[np.uint8]:
     return quantise(display_codes(np.clip(good, 0.0, 1e9), Display()))
 
 
-def render_pictures(shot: Shot, against: str, estimates: int) -> Pictures:
+def render_pictures(
+    shot: Shot, against: str, estimates: int, count: int = 0
+) -> tuple[Pictures, Breakdown | None]:
     """Render a shot and what to compare it with.
 
     Parameters
@@ -209,24 +239,44 @@ def render_pictures(shot: Shot, against: str, estimates: int) -> Pictures:
         B's technique.
     estimates : int
         Least samples of a technique that samples.
+    count : int
+        Pixels at which A's error is broken down, 0 for none.
     """
     scene = shot.scene
     names = technique_of(scene, shot.settings.technique), technique_of(scene, against)
     sampled = [find_technique(name).is_sampled for name in names]
     a, b, positions = shared_samples(shot.settings.samples, (sampled[0], sampled[1]), estimates)
-    radiance, shown = [], []
+    radiance, shown, points = [], [], None
     with headless_renderer() as (ctx, renderer), Steps("rendering", a + b) as steps:
-        for name, count in zip(names, (a, b), strict=True):
+        for name, samples in zip(names, (a, b), strict=True):
             settings = replace(shot.settings, technique=name, positions=positions, samples=1)
             wanted = replace(shot, settings=settings)
             before = steps.count
-            while (done := renderer.accumulate(wanted, count)) < count:
+            while (done := renderer.accumulate(wanted, samples)) < samples:
                 ctx.finish()
                 steps.done(before + done)
-            steps.done(before + count)
+            steps.done(before + samples)
             radiance.append(renderer.radiance())
             shown.append(renderer.display())
-    return Pictures(names, radiance[0], radiance[1], shown[0], shown[1], scene.lights)
+            if count and name == names[0] and points is None:
+                points = _points(renderer, wanted, count)
+    pictures = Pictures(names, radiance[0], radiance[1], shown[0], shown[1], scene.lights)
+    if points is None:
+        return pictures, None
+    if not points.count:
+        raise InputError("--breakdown: the picture shows no surface, expected one that does")
+    total = points.count + len(scene.lights)
+    with Steps("breaking the error down", total) as steps:
+        return pictures, break_down(points, scene, names[0], lambda done, _: steps.done(done))
+
+
+def _points(renderer: Renderer, shot: Shot, count: int) -> Points:
+    """Return random points of the picture rendered last, which shows ``shot``."""
+    places = random_places((shot.width, shot.height))
+    gathering = Gathering(renderer, shot.scene, shot.settings.technique, places, count)
+    while not gathering.step():
+        pass
+    return gathering.points()
 
 
 class _Picture:
@@ -293,7 +343,36 @@ def _percent(share: float | None) -> str:
     return "-" if share is None else f"{100.0 * share:.3g} %"
 
 
-def _json(pictures: Pictures, found: Numbers, mean_flip: float | None) -> dict[str, Any]:
+def breakdown_table(parts: Breakdown) -> Table:
+    """Return what each approximation adds to a technique's error as a table."""
+    count, mean = len(parts.exact), float(np.mean(parts.exact @ np.array(LUMINANCE)))
+    table = Table(
+        title=f"Whose {parts.technique}'s error is: luminance at {count} random pixels' points, "
+        f"where {mean:.3g} is exact on average"
+    )
+    table.add_column("part")
+    for head in ("mean", "95 % below", "largest", "brighter by"):
+        table.add_column(head, justify="right")
+    for name, *values in parts.rows():
+        if name == "all":
+            table.add_section()
+        table.add_row(name, *(f"{value:.2g}" for value in values))
+    return table
+
+
+def _json(
+    pictures: Pictures, found: Numbers, mean_flip: float | None, parts: Breakdown | None
+) -> dict[str, Any]:
     a, b = pictures.names
     height, width = pictures.a.shape[:2]
-    return {"a": a, "b": b, "size": [width, height], **asdict(found), "flip": mean_flip}
+    told = {"a": a, "b": b, "size": [width, height], **asdict(found), "flip": mean_flip}
+    if parts is not None:
+        heads = ("mean", "p95", "max", "bias")
+        told["breakdown"] = {
+            "points": len(parts.exact),
+            "exact": float(np.mean(parts.exact @ np.array(LUMINANCE))),
+            "parts": {
+                name: dict(zip(heads, values, strict=True)) for name, *values in parts.rows()
+            },
+        }
+    return told

@@ -44,7 +44,7 @@ class Picker:
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
         self._target: moderngl.Framebuffer | None = None
-        self._counted: moderngl.Framebuffer | None = None
+        self._shaded: moderngl.Framebuffer | None = None
 
     def pick(
         self, gbuffer: GBufferPass, frame: CameraFrame, size: tuple[int, int], x: float, y: float
@@ -66,7 +66,7 @@ class Picker:
             tangent = _vec3(direction_from_octahedral(self._read(1, 2)[None])[0])
         return Hit("object", identity, position, _vec3(normal), tangent)
 
-    def evaluations(
+    def shade(
         self,
         gbuffer: GBufferPass,
         lighting: LightingPass,
@@ -75,15 +75,15 @@ class Picker:
         size: tuple[int, int],
         x: float,
         y: float,
-    ) -> int:
-        """Return how often ``lighting`` evaluates its integral there, lights and all.
+    ) -> Vec3:
+        """Return what ``lighting`` makes of the point there: radiance, or its cost if it counts.
 
-        ``features`` are those of the picture, counting.
+        ``features`` are those of the picture, of a single sample.
         """
         target = self._draw(gbuffer, frame, size, x, y)
-        if self._counted is None:
+        if self._shaded is None:
             texture = self._ctx.texture((1, 1), 4, dtype="f4")
-            self._counted = self._ctx.framebuffer(color_attachments=[texture])
+            self._shaded = self._ctx.framebuffer(color_attachments=[texture])
         surfaces, tangents = target.color_attachments
         assert isinstance(surfaces, moderngl.Texture)
         assert isinstance(tangents, moderngl.Texture)
@@ -91,11 +91,11 @@ class Picker:
         ray = frame.ray(x, y, size)
         pixel = CameraFrame(frame.eye, ray, frame.right / size[0], frame.up / size[1])
         lighting.draw(
-            self._counted, surfaces, tangents if features.tangents else None, features, pixel,
+            self._shaded, surfaces, tangents if features.tangents else None, features, pixel,
             (0.0, 0.0), None, 0,
         )  # fmt: skip
-        raw = self._counted.read(components=1, dtype="f4")
-        return round(float(np.frombuffer(raw, dtype=np.float32)[0]))
+        raw = self._shaded.read(components=3, dtype="f4")
+        return _vec3(np.frombuffer(raw, dtype=np.float32).astype(np.float64))
 
     def _draw(
         self, gbuffer: GBufferPass, frame: CameraFrame, size: tuple[int, int], x: float, y: float
@@ -120,7 +120,7 @@ class Picker:
 
     def release(self) -> None:
         """Release every GPU object."""
-        for target in (self._target, self._counted):
+        for target in (self._target, self._shaded):
             if target is None:
                 continue
             attachments = (*target.color_attachments, target.depth_attachment)
@@ -128,7 +128,7 @@ class Picker:
             for attachment in attachments:
                 if attachment is not None:
                     attachment.release()
-        self._target = self._counted = None
+        self._target = self._shaded = None
 
 
 def direction_from_octahedral(p: FloatArray) -> FloatArray:

@@ -327,16 +327,31 @@ class Renderer:
         RuntimeError
             If nothing was rendered yet.
         """
+        return round(self._shade(x, y, counts=True)[0])
+
+    def shade_at(self, x: float, y: float) -> Vec3:
+        """Return the radiance of one point of the last shot by a single sample.
+
+        Pixel coordinates are those of `pick`.
+
+        Raises
+        ------
+        RuntimeError
+            If nothing was rendered yet.
+        """
+        return self._shade(x, y, counts=False)
+
+    def _shade(self, x: float, y: float, counts: bool) -> Vec3:
         if self._seen is None or self._needs is None:
             raise RuntimeError("nothing was rendered yet")
         shot = self._seen.shot
-        lighting = replace(self._needs.lighting, counts=True, accumulates=False)
+        lighting = replace(self._needs.lighting, counts=counts, accumulates=False)
         if not lighting.lit:
-            return 0
+            return 0.0, 0.0, 0.0
         self._hold_geometry(shot.scene, self._gbuffer.has_tangents)
         frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
         size = (shot.width, shot.height)
-        return self._picker.evaluations(self._gbuffer, self._lighting, lighting, frame, size, x, y)
+        return self._picker.shade(self._gbuffer, self._lighting, lighting, frame, size, x, y)
 
     def pick(self, x: float, y: float) -> Hit | None:
         """Return what the last shot shows at pixel coordinates from the top left, or None.

@@ -478,6 +478,13 @@ CASES: dict[str, Case] = {
     "compare's range": bad_arguments(
         "compare", "scene.json", "--range", "-1", parts=("--range is -1", "above 0")
     ),
+    "compare's breakdown of noise": bad_arguments(
+        "compare", "scene.json", "--technique", "reference", "--breakdown", "9",
+        parts=("technique reference", "noise"),
+    ),
+    "compare's breakdown of pictures": bad_arguments(
+        "compare", "a.png", "b.png", "--breakdown", "9", parts=("--breakdown", "needs a scene"),
+    ),
     "compare to text": bad_arguments(
         "compare", "scene.json", "-o", "out.txt", parts=("out.txt", ".png")
     ),

@@ -164,3 +164,17 @@ def test_exr_of_other_programs(tmp_path: Path) -> None:
         with OpenEXR.File(header, channels) as file:
             file.write(str(path))
         np.testing.assert_array_equal(read_image(path), rgb.astype(np.float32))
+
+
+def test_breakdown(said: Said) -> None:
+    arguments = ("lit.json", "--technique", "ltc", "--against", "ggx:4", *SIZE)
+    found = compared(said, *arguments, "--breakdown", "5")["breakdown"]
+    assert found["points"] == 5
+    parts = found["parts"]
+    assert list(parts) == [
+        "Fresnel", "lobe", "table", "textures", "outline", "float32", "all",
+    ]  # fmt: skip
+    whole = sum(part["bias"] for name, part in parts.items() if name != "all")
+    assert whole == pytest.approx(parts["all"]["bias"], abs=1e-12)
+    assert parts["float32"]["max"] < 1e-5
+    assert "Whose ltc's error is" in said("compare", *arguments, "--breakdown", "1")
