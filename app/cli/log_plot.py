@@ -23,8 +23,7 @@ LEAST_OCTAVES = 1.0
 class Point:
     """One mark: ``low`` to ``high`` is the range of x that its whisker shows.
 
-    Points of the same ``series`` are joined in their order, those of none by nothing; ``low_y``
-    to ``high_y`` is the range of y, where there is one.
+    Points of the same ``series`` are joined in their order, those of none by nothing.
     """
 
     x: float
@@ -36,8 +35,6 @@ class Point:
     on_front: bool = False
     shape: Shape = "circle"
     series: str = ""
-    low_y: float = 0.0
-    high_y: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -110,8 +107,6 @@ def log_plot(
         px, py = x(point.x), y(point.y)
         if point.low > 0.0 and point.high > point.low:
             parts.append(Line(((x(point.low), py), (x(point.high), py)), point.colour, 0.5))
-        if point.low_y > 0.0 and point.high_y > point.low_y:
-            parts.append(Line(((px, y(point.low_y)), (px, y(point.high_y))), point.colour, 0.5))
         tip = f"{point.label}: {point.x:.4g}, {point.y:.3g}"
         parts.append(Mark(px, py, point.shape, point.colour, point.on_front, tip=tip))
         if labelled:

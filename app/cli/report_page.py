@@ -14,8 +14,8 @@ from app.cli.report_plots import (
     EVALUATIONS,
     STYLES,
     TIME,
+    kind_of,
     scene_plot,
-    style_of,
     summary_plot,
     summary_rows,
 )
@@ -133,8 +133,8 @@ def _summary(rows: Sequence[Row]) -> list[str]:
         lines.append(f"<tr{front}><td>{escape(row['technique'])}</td>{cells}</tr>")
     return [
         "<h2>All scenes</h2>",
-        f"<p>Geometric means over the {found[0]['scenes']} scenes; what is the "
-        "same as ltc where nothing is curved counts as that there.</p>",
+        f"<p>Geometric means over the {found[0]['scenes']} scenes that every technique was "
+        "measured in; what is the same as ltc where nothing is curved counts as that there.</p>",
         '<div class="side">',
         _figure(summary_plot(rows), "Mean error to GGX by time of the lighting pass"),
         "</div>",
@@ -170,11 +170,11 @@ def _figure(plot: Drawing | None, caption: str) -> str:
 
 
 def _legend(techniques: Sequence[str]) -> str:
-    found = {technique.partition(":")[0] for technique in techniques}
-    names = [*(name for name in STYLES if name in found), *sorted(found - set(STYLES))]
+    found = {kind_of(technique) for technique in techniques}
     keys = []
-    for name in names:
-        colour, shape = style_of(name)
+    for name, (colour, shape) in STYLES.items():
+        if name not in found:
+            continue
         key = svg_element(Drawing(12, 12, name, [Mark(6, 6, shape, colour, True, 4.0)]))
         keys.append(f"{key} {escape(name)}")
     return f"<p>{' &nbsp; '.join(keys)}</p>"

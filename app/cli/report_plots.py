@@ -8,10 +8,13 @@ from collections.abc import Mapping, Sequence
 from app.cli.drawing import Drawing, Shape
 from app.cli.log_plot import Point, log_plot, pareto_front
 from app.cli.report_parts import Row
-from app.measure.entries import parse_entry
+from app.measure.entries import Entry, parse_entry
+from app.render.techniques import VARIANTS
 
 STYLES: Mapping[str, tuple[str, Shape]] = {
     "ltc": ("#2f81f7", "circle"),
+    "ltc, other tables": ("#7a73e8", "diamond"),
+    "ltc, cut otherwise": ("#b8860b", "down"),
     "ggx": ("#e8590c", "square"),
     "adaptive": ("#2f9e44", "triangle"),
     "adaptive-extrapolated": ("#12a5a5", "down"),
@@ -19,9 +22,9 @@ STYLES: Mapping[str, tuple[str, Shape]] = {
     "reference": ("#868e96", "cross"),
     "representative-point": ("#e03177", "triangle"),
 }
-"""Colour and shape by a technique's bare name; each at least 3:1 against white and black."""
+"""Colour and shape by kind, see `kind_of`; each at least 3:1 against white and against black."""
 
-OTHER: tuple[str, Shape] = ("#868e96", "diamond")
+OTHER: tuple[str, Shape] = ("#868e96", "square")
 
 TIME, EVALUATIONS = "lighting_ms", "evaluations"
 AXES = {TIME: "lighting pass [ms]", EVALUATIONS: "evaluations per pixel"}
@@ -31,9 +34,13 @@ SUMMARY = "all-scenes"
 """Name of the plot of means over all scenes, and its file."""
 
 
-def style_of(technique: str) -> tuple[str, Shape]:
-    """Return colour and shape of a technique's marks."""
-    return STYLES.get(technique.partition(":")[0], OTHER)
+def kind_of(technique: str) -> str:
+    """Return what kind of entry one is: its bare name, or what a variant changes."""
+    entry = parse_entry(technique)
+    if not entry.variant:
+        return entry.name
+    changes = VARIANTS[entry.variant]
+    return "ltc, other tables" if changes.residual is not None else "ltc, cut otherwise"
 
 
 def scene_plot(rows: Sequence[Row], x: str, lobe: str) -> Drawing | None:
@@ -52,44 +59,41 @@ def scene_plot(rows: Sequence[Row], x: str, lobe: str) -> Drawing | None:
 
 
 def _point(
-    technique: str, cost: float, error: float, low: float, high: float, on_front: bool,
-    low_y: float = 0.0, high_y: float = 0.0,
-) -> Point:  # fmt: skip
-    colour, shape = style_of(technique)
-    series = technique.partition(":")[0]
-    return Point(cost, error, technique, colour, low, high, on_front, shape, series, low_y, high_y)
+    technique: str, cost: float, error: float, low: float, high: float, on_front: bool
+) -> Point:
+    kind = kind_of(technique)
+    colour, shape = STYLES.get(kind, OTHER)
+    series = "" if kind == "ltc, cut otherwise" else kind
+    return Point(cost, error, technique, colour, low, high, on_front, shape, series)
 
 
 def summary_rows(rows: Sequence[Row]) -> list[Row]:
-    """Return one row a technique: geometric means over scenes that are the same for all.
+    """Return one row a technique: geometric means over the scenes that every one was measured in.
 
-    Those are the scenes that ``ltc`` was measured in; a technique that a scene leaves out because
-    without curves it is ``ltc`` counts as ``ltc`` there, others that miss one are left out. Errors
-    of 0 count as 1e-9, a hundredth of what float32 can tell.
+    What a scene leaves out because without curves it is ``ltc`` counts as ``ltc`` there. Errors of
+    0 count as 1e-9, a hundredth of what float32 can tell.
     """
     by_scene: dict[str, dict[str, Row]] = {}
     for row in rows:
         if None not in (row.get(TIME), row["specular_ggx_mean"]):
             by_scene.setdefault(row["scene"], {})[row["technique"]] = row
-    by_scene = {name: some for name, some in by_scene.items() if "ltc" in some}
+    entries = sorted(
+        (parse_entry(name) for name in {r["technique"] for r in rows}), key=Entry.place
+    )
+    for scene in by_scene.values():
+        for entry in entries:
+            if "ltc" in scene and entry.known.has_tables and not entry.variant:
+                scene.setdefault(str(entry), scene["ltc"])
+    names = [str(entry) for entry in entries]
+    shared = [scene for scene in by_scene.values() if set(names) <= set(scene)]
     found = []
-    names = {row["technique"] for row in rows}
-    for technique in sorted(names, key=lambda name: parse_entry(name).place()):
-        alike = technique.partition(":")[0] in (
-            "ltc", "adaptive", "adaptive-extrapolated", "uniform",
-        )  # fmt: skip
-        some = [
-            scene.get(technique, scene["ltc"] if alike else None) for scene in by_scene.values()
-        ]
-        whole = [row for row in some if row is not None]
-        if not whole or len(whole) < len(some):
-            continue
-        times = [row[TIME] for row in whole]
-        errors = [max(row["specular_ggx_mean"], 1e-9) for row in whole]
+    for technique in names if shared else ():
+        times = [scene[technique][TIME] for scene in shared]
+        errors = [max(scene[technique]["specular_ggx_mean"], 1e-9) for scene in shared]
         found.append(
             {
                 "technique": technique,
-                "scenes": len(whole),
+                "scenes": len(shared),
                 TIME: _geometric_mean(times),
                 "error": _geometric_mean(errors),
                 "least": min(errors),

@@ -17,6 +17,7 @@ from PIL import Image
 
 from app.cli import report_run
 from app.cli.main import run
+from app.cli.report_plots import STYLES, kind_of
 from app.cli.report_run import run_report
 from app.measure.entries import entries_of, parse_entry
 from app.measure.errors import choose_points, exact_truth, lit_evenly, sampled_truth
@@ -187,6 +188,13 @@ def test_page_is_whole_and_loads_nothing(made: Path) -> None:
             assert repr(row[key]) in values
 
 
+def test_every_technique_has_a_style(made: Path) -> None:
+    entries = entries_of(load_scene(made / "disk.json"))
+    assert {kind_of(str(entry)) for entry in entries} == set(STYLES)
+    marks = list(STYLES.values())
+    assert len(set(marks)) == len(marks)
+
+
 def test_plots_are_files_too(made: Path) -> None:
     for name in ("all-scenes", "disk", "brushed"):
         assert Image.open(made / "out" / f"{name}.png").size == (1120, 760)
@@ -314,7 +322,10 @@ def test_entries(made: Path) -> None:
     assert len(names) == len(set(names))
     # Where nothing is curved those are one program, and measured once.
     left = {str(entry) for entry in entries_of(plain)}
-    assert set(names) - left == {name for name in names if name.startswith(("ltc:", "ad", "uni"))}
+    curved_only = {name for name in names if name.startswith(("ltc:", "ad", "uni"))}
+    # Brushed surfaces look up a table of one size.
+    tables = {"ltc/no-table", "ltc/table-4", "ltc/table-8", "ltc/table-32"}
+    assert set(names) - left == curved_only | tables
     assert [str(e) for e in entries_of(plain, ["reference", "auto", "ggx"])] == [
         "ggx",
         "reference:1",
