@@ -15,19 +15,22 @@ from app.lobe_picture import directions_above
 from app.panels.lobe_pictures import LightLine
 from app.render.camera import world_from_object
 from app.render.picking import Hit, facing_normal
-from app.render.truth import shading_frames
+from app.render.truth import shading_contours, shading_frames
 from app.scene import AreaLight, Camera, Scene
+from ltc import transform
 from ltc.bezier import evaluate
-from ltc.lobe import THETA_MAX, Case, about_normal
+from ltc.curved_outline import ltc_form_factor
+from ltc.curved_reference import curve_specular_integral_batch
+from ltc.lobe import THETA_MAX, Case, LobePair, about_normal
 
 FloatArray = NDArray[np.float64]
 
-FEW, MANY = 4, 64
-"""Points on a curve of an outline, for outlines of many curves and of few."""
-POINTS = 4000
-"""How many points to spend on an outline."""
+SAMPLED = 8
+"""Steps along a segment of an outline from which its length in a point's sky is estimated."""
 STEP = math.radians(3.0)
-"""Curves whose points are further apart than this in a point's sky get others."""
+"""Length in the sky of the lines that stand for a segment, about."""
+LEAST, MOST = 4, 64
+"""Lines that stand for a curve; straight segments may have fewer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,11 +134,10 @@ def light_lines(
     lines = []
     for index, light in enumerate(lights):
         origin, u, v = (np.array(a) for a in (light.plane.origin, light.plane.u, light.plane.v))
-        front = float(np.cross(u, v) @ (subject.position - origin)) > 0.0
-        shines = any(light.radiance) and (front or light.two_sided)
+        shines = _shines(light, subject.position)
         segments = contours.segments_of(light.outline)
         world = origin + segments.curves @ np.stack([u, v])
-        points = _subdivided(world, subject.position)
+        points = _subdivided(world, segments.straight, subject.position)
         for first, last in pairwise(segments.starts):
             line = np.concatenate([*points[first:last], points[first][:1]])
             lines += [
@@ -145,18 +147,50 @@ def light_lines(
     return tuple(sorted(lines, key=lambda line: (line.chosen, line.shines)))
 
 
-def _subdivided(curves: FloatArray, position: FloatArray) -> list[FloatArray]:
+def light_share(light: AreaLight, subject: Subject, pair: LobePair) -> tuple[float, float]:
+    """Return what a light of radiance 1 adds to a point for F = 1: by GGX, by its LTC.
+
+    Both to rounding, along the light's own curves.
+    """
+    if not _shines(light, subject.position):
+        return 0.0, 0.0
+    sees = shading_contours(light, subject.position[None], subject.frame[None])
+    front = _is_in_front(light, subject.position)
+    ax, ay = np.array([[pair.case.alpha_x], [pair.case.alpha_y]])
+    ggx, _ = curve_specular_integral_batch(sees, pair.case.wo[None], ax, ay)
+    gain = pair.albedo / (1.0 - pair.leak)
+    ltc = gain * ltc_form_factor(transform.invert(pair.M)[None], sees).value
+    sign = 1.0 if front else -1.0
+    return max(sign * float(ggx[0]), 0.0), max(sign * float(ltc[0]), 0.0)
+
+
+def _is_in_front(light: AreaLight, position: FloatArray) -> bool:
+    away = np.cross(light.plane.u, light.plane.v)
+    return float(away @ (position - np.array(light.plane.origin))) > 0.0
+
+
+def _shines(light: AreaLight, position: FloatArray) -> bool:
+    return any(light.radiance) and (light.two_sided or _is_in_front(light, position))
+
+
+def _subdivided(
+    curves: FloatArray, straight: NDArray[np.bool_], position: FloatArray
+) -> list[FloatArray]:
     """Return points of curves (n, 4, 3), (k, 3) each without their ends, dense in the sky."""
-    count = int(np.clip(POINTS // len(curves), FEW, MANY))
-    t = np.linspace(0.0, 1.0, count + 1)
-    points = evaluate(curves[:, None], t)
-    ways = points - position
+    t = np.linspace(0.0, 1.0, SAMPLED + 1)
+    ways = evaluate(curves[:, None], t) - position
     ways /= np.maximum(np.linalg.norm(ways, axis=-1, keepdims=True), 1e-300)
-    steps = np.linalg.norm(np.diff(ways, axis=1), axis=-1)
-    found = list(points[:, :-1])
-    for i in np.flatnonzero(steps.max(axis=1) > STEP):
-        # Again at places that are evenly spread in the sky, as far as the first ones tell.
-        along = np.concatenate([[0.0], np.cumsum(np.maximum(steps[i], 1e-9))])
-        again = np.interp(np.linspace(0.0, along[-1], MANY + 1), along, t)
-        found[i] = evaluate(curves[i], again)[:-1]
-    return found
+    steps = np.maximum(np.linalg.norm(np.diff(ways, axis=1), axis=-1), 1e-12)
+    along = np.concatenate([np.zeros((len(curves), 1)), np.cumsum(steps, axis=1)], axis=1)
+    wanted = np.maximum(along[:, -1] / STEP, np.where(straight, 1.0, LEAST))
+    counts = 2 ** np.ceil(np.log2(np.minimum(wanted, MOST))).astype(int)
+    points: list[FloatArray] = [np.zeros((0, 3))] * len(curves)
+    for count in np.unique(counts).tolist():
+        which = np.flatnonzero(counts == count)
+        # At places that are evenly spread in the sky, as far as the samples tell.
+        shares = np.arange(count) / count
+        places = np.stack([np.interp(shares * along[i, -1], along[i], t) for i in which])
+        found = evaluate(curves[which, None], places)
+        for i, line in zip(which.tolist(), found, strict=True):
+            points[i] = line
+    return points

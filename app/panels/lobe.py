@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 from imgui_bundle import imgui
 
 from app.panels.lobe_pictures import LobeView, lobe_pictures
-from app.panels.widgets import ACCENT, MUTED, button, checkbox, hint, slider, tooltip
+from app.panels.widgets import ACCENT, MUTED, button, heading, hint, slider, tooltip
 from ltc.lobe import THETA_MAX, Case, LobePair
 from ltc.table import ALPHA_MIN
 
@@ -18,6 +19,8 @@ Mode: TypeAlias = Literal["pointer", "pinned", "free"]
 SNAP = 0.03
 """Ratios of alphas that are closer to 1 than this become 1: there the table is another."""
 RATIO_MIN = 0.01
+LEAST_SHARE = 1e-4
+"""Share of a light from which on its error is told in relation to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +62,30 @@ class LobeState:
         return replace(self, alpha=larger, ratio=ratio, theta=math.degrees(case.theta), phi=phi)
 
 
-def lobe_panel(state: LobeState, view: LobeView | None, can_pin: bool, pin_key: str) -> LobeState:
+@dataclass(frozen=True, slots=True)
+class LightShare:
+    """What a light of radiance 1 adds to the point for F = 1: by GGX, and by its LTC."""
+
+    name: str
+    ggx: float
+    ltc: float
+
+
+def lobe_panel(
+    state: LobeState,
+    view: LobeView | None,
+    shares: Sequence[LightShare],
+    can_pin: bool,
+    pin_key: str,
+) -> LobeState:
     """Draw the panel and return what the user chose.
 
     Parameters
     ----------
     view : LobeView or None
         None while no point was hovered yet.
+    shares : sequence of LightShare
+        Of the lights as far as they are known, the most important first.
     can_pin : bool
         Whether there is a point that could be pinned.
     pin_key : str
@@ -77,18 +97,27 @@ def lobe_panel(state: LobeState, view: LobeView | None, can_pin: bool, pin_key: 
         return new
     hint(f"{view.title}. {view.note}" if view.note else f"{view.title}.")
     lobe_pictures(view)
-    new = replace(
-        new,
-        logarithmic=checkbox("Log scale", new.logarithmic, "Four powers of ten below the peak"),
-        follows=checkbox(
-            "Zoom", new.follows, "Show the part of the disk where the lobes are, not all of it"
-        ),
-    )
+    new = _toggles(new)
+    _numbers(view.pair)
+    if shares:
+        _shares(shares)
+    heading("By hand")
     shown = _sliders(new.at(view.pair.case))
     if shown != new.at(view.pair.case):
         new = replace(shown, mode="free")
-    _numbers(view.pair)
+    heading("Transform")
+    _matrix(view.pair)
     return new
+
+
+def _toggles(state: LobeState) -> LobeState:
+    """Draw what the pictures' scale and place may be."""
+    _, logarithmic = imgui.checkbox("Log scale###log scale", state.logarithmic)
+    tooltip("Powers of ten below the peak: four, of the difference two")
+    imgui.same_line(0.5 * imgui.get_content_region_avail().x)
+    _, follows = imgui.checkbox("Zoom###zoom lobe", state.follows)
+    tooltip("Show the part of the disk where the lobes are, not all of it")
+    return replace(state, logarithmic=logarithmic, follows=follows)
 
 
 def _modes(state: LobeState, view: LobeView | None, can_pin: bool, pin_key: str) -> LobeState:
@@ -135,7 +164,7 @@ def _sliders(state: LobeState) -> LobeState:
 
 
 def _numbers(pair: LobePair) -> None:
-    """Draw the figures of both lobes, and the matrix."""
+    """Draw the figures of both lobes."""
     case, flags = pair.case, imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop
     rows = (
         ("αx, αy", f"{case.alpha_x:.4g}, {case.alpha_y:.4g}", "GGX parameters along x and y"),
@@ -157,6 +186,11 @@ def _numbers(pair: LobePair) -> None:
             imgui.text_unformatted(text)
             tooltip(tip)
         imgui.end_table()
+
+
+def _matrix(pair: LobePair) -> None:
+    """Draw M, row by row."""
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop
     if imgui.begin_table("M", 4, flags):
         for row, label in zip(pair.M.tolist(), ("M", "", ""), strict=True):
             imgui.table_next_row()
@@ -170,3 +204,25 @@ def _numbers(pair: LobePair) -> None:
                 imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
                 imgui.text_unformatted(text)
         imgui.end_table()
+
+
+def _shares(shares: Sequence[LightShare]) -> None:
+    """Draw what the lights add."""
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop
+    if not imgui.begin_table("shares", 4, flags):
+        return
+    tip = "What the light adds here for radiance 1 and F = 1: exact, and by the table"
+    for text in ("Light", "GGX", "LTC", "Error"):
+        imgui.table_next_column()
+        imgui.text_colored(MUTED, text)
+        tooltip(tip)
+    for share in shares:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.text_unformatted(share.name)
+        off = share.ltc - share.ggx
+        relative = f"{100.0 * off / share.ggx:+.1f} %" if share.ggx > LEAST_SHARE else "–"
+        for text in (f"{share.ggx:.4f}", f"{share.ltc:.4f}", relative):
+            imgui.table_next_column()
+            imgui.text_unformatted(text)
+    imgui.end_table()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from app.colour_maps import BERLIN, MAGMA, ColourMap
 from app.lobe_picture import NAMES, Line, Mark, Scale, graticule, marks, number
 from app.panels.widgets import ACCENT, MUTED
-from ltc.lobe import LobePair, Window, direction_from_disk
+from ltc.lobe import Case, LobePair, Window, direction_from_disk
 
 FloatArray = NDArray[np.float64]
 
@@ -95,22 +95,19 @@ def lobe_pictures(view: LobeView) -> None:
     _scale(low, wide, MAGMA, view.scale.ticks())
     _scale(ImVec2(low.x, low.y + 2.3 * em), wide, BERLIN, view.scale.signed_ticks())
     if not in_a_row:
-        _summary(view.pair)
+        _summary(view.pair.case)
     imgui.end_group()
 
 
-def _summary(pair: LobePair) -> None:
-    """Say what matters most, in the place that three pictures leave."""
+def _summary(case: Case) -> None:
+    """Say which view it is, in the place that three pictures leave."""
     size = 0.87 * imgui.get_font_size()
     imgui.push_font(None, size)
-    for name, text in (
-        ("αx, αy", f"{pair.case.alpha_x:.3g}, {pair.case.alpha_y:.3g}"),
-        ("variation", f"{pair.variation:.3f}"),
-        ("below", f"{100.0 * pair.leak:.1f} %"),
-    ):
+    phi = math.degrees(math.remainder(case.phi, 2.0 * math.pi))
+    for name, degrees in (("theta", math.degrees(case.theta)), ("phi", phi)):
         imgui.text_colored(MUTED, name)
-        imgui.same_line(4.2 * size + imgui.get_cursor_start_pos().x)
-        imgui.text_unformatted(text)
+        imgui.same_line(3.4 * size + imgui.get_cursor_start_pos().x)
+        imgui.text_unformatted(f"{degrees:.1f}°")
     imgui.pop_font()
 
 

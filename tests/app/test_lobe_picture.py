@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.gui.lobe_point import SurfacePoint, light_lines, subject_of
+from app.gui.lobe_point import SurfacePoint, light_lines, light_share, subject_of
 from app.lobe_picture import Scale, directions_above, graticule, lobe_images, marks, number
 from app.render.camera import normal_from_object, world_from_object
 from app.render.picking import Hit
@@ -23,7 +23,7 @@ from app.scene import (
     SceneObject,
     Transform,
 )
-from ltc.lobe import WHOLE, Case, disk_from_direction, lobe_pair
+from ltc.lobe import WHOLE, Case, disk_from_direction, lobe_pair, pixel_directions
 
 
 @pytest.mark.parametrize("logarithmic", [False, True])
@@ -178,3 +178,31 @@ def test_lights_where_a_point_sees_them() -> None:
     cosine = 3.0 / math.sqrt(3.0**2 + 2.0)
     assert far == pytest.approx(math.sqrt(1.0 - cosine), rel=1e-9)
     np.testing.assert_allclose(bright.points[0], bright.points[-1])
+
+
+def test_what_a_light_adds() -> None:
+    """Against the integral of the pictures themselves: pixels within the light's outline."""
+    square = Outline((PolygonContour(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))),))
+    lamp = AreaLight("lamp", square, Plane((-0.8, 1.8, -0.9), (1.0, 0.2, 0.0), (0.0, 0.3, 1.0)))
+    point = SurfacePoint.of(hit_on(SCENE, (0.0, 0.0, 0.0)), SCENE)
+    assert point is not None
+    seen = subject_of(point, SCENE, SCENE.camera)
+    assert seen is not None
+    pair = lobe_pair(seen.case)
+    size = 1024
+    w, _ = pixel_directions(size)
+    normal = np.cross(lamp.plane.u, lamp.plane.v)
+    away = w @ seen.frame
+    distance = (np.array(lamp.plane.origin) - seen.position) @ normal / (away @ normal)
+    flat = seen.position + distance[:, None] * away - np.array(lamp.plane.origin)
+    st = flat @ np.linalg.pinv(np.array([lamp.plane.u, lamp.plane.v]))
+    covered = (distance > 0.0) & (np.abs(st) < 1.0).all(axis=-1)
+    solid_angle = 8.0 / size**2
+    want = [f(w)[covered].sum() * solid_angle for f in (pair.ggx, pair.ltc)]
+    got = light_share(lamp, seen, pair)
+    np.testing.assert_allclose(got, want, rtol=0.01)  # pixels at the edge, in or out as a whole
+    assert got[0] > 0.01
+    turned = replace(lamp, plane=replace(lamp.plane, u=lamp.plane.v, v=lamp.plane.u))
+    assert light_share(turned, seen, pair) == (0.0, 0.0)
+    both = replace(turned, two_sided=True)
+    np.testing.assert_allclose(light_share(both, seen, pair), got, rtol=1e-9)

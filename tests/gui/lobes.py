@@ -14,6 +14,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.gui.lobe_window import FINE
+from app.panels.lobe import LobeState
 from app.scene import Vec3
 from ltc.lobe import LobePair
 from tests.gui.application import Application
@@ -26,7 +27,8 @@ def show(app: Application) -> None:
     floor, red = app.scene.materials
     brushed = replace(floor, alpha=(0.3, 0.05))
     app.window.show(replace(app.scene, materials=(brushed, red)), None)
-    app.window.lobe.state = type(app.window.lobe.state)()
+    app.window.viewport.settings = replace(app.window.viewport.settings, samples=1)
+    app.window.lobe.state = LobeState()
     app.act(lambda ctx: ctx.window_focus("//Lobe"))
     app.settle()
 
@@ -42,6 +44,7 @@ def hover(app: Application, point: Vec3) -> None:
         ctx.yield_(3)
 
     app.act(action)
+    app.frame()
     app.until(lambda: app.window.lobe.is_settled)
 
 
@@ -67,6 +70,13 @@ def lobe_under_the_pointer(app: Application, out: Path) -> None:
     texture = app.window.lobe._textures[0]
     shown = np.frombuffer(texture.read(), np.uint8).reshape(FINE, FINE, 4)
     assert shown[..., :3].max() > 180, "the lobe is in its picture"
+
+    shares = app.window.lobe._shares
+    assert shares is not None
+    (share,) = shares[2]
+    assert share.name == "key"
+    assert 0.0 < share.ggx < pair.exact_albedo
+    assert abs(share.ltc - share.ggx) < 0.1 * pair.exact_albedo
 
     hover(app, ON_THE_BALL)
     assert pair_of(app).table == "ltc_isotropic.npz"
@@ -123,8 +133,8 @@ def lobe_by_hand(app: Application, out: Path) -> None:
     assert math.isclose(case.alpha_y, 0.25 * case.alpha_x)
     hover(app, ON_THE_FLOOR)
     assert pair_of(app).case == case
-    app.click("##log scale")
-    app.click("##zoom")
+    app.click("###log scale")
+    app.click("###zoom lobe")
     assert not (app.window.lobe.state.logarithmic or app.window.lobe.state.follows)
     app.settle()
     assert app.scene == scene, "the panel edits nothing"
