@@ -46,6 +46,12 @@ def format_bytes(count: int) -> str:
     return f"{count / 1024**2:.1f} MB"
 
 
+def share_text(share: float) -> str:
+    """Return a share as people write it: 1/1024, or a decimal number."""
+    parts = round(1.0 / share) if share else 0
+    return f"1/{parts}" if parts > 1 and abs(share * parts - 1.0) < 1e-9 else f"{share:g}"
+
+
 def section_lines(section: PlanSection) -> list[str]:
     """Return a section in plain text, a few columns wide."""
     lines = [section.title]

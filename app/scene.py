@@ -392,6 +392,10 @@ class RenderSettings:
     One sample is exactly the pixel centre. ``view`` is what a pixel shows: its radiance, or its
     cost, the number of evaluations of the contour integral that its lights took.
 
+    ``cull`` is the radiance that all that is skipped at a pixel may add up to, as a share of
+    display white (radiance 1 at the scene's exposure): lights that a certified bound puts below
+    their part of it are not integrated. 0 integrates everything.
+
     ``positions`` is how many places in a pixel the samples take in turn, 0 for one of its own
     each: pictures of different techniques with unequal numbers of samples differ by nothing but
     the technique if they share it, and their samples are multiples of it.
@@ -401,6 +405,7 @@ class RenderSettings:
     samples: int = 1
     view: PixelView = "radiance"
     positions: int = 0
+    cull: float = 0.0
 
     def __post_init__(self) -> None:
         if self.view not in PIXEL_VIEWS:
@@ -409,6 +414,8 @@ class RenderSettings:
             raise SceneError(f"samples is {self.samples}, expected between 1 and {MAX_SAMPLES}")
         if not 0 <= self.positions <= MAX_SAMPLES:
             raise SceneError(f"positions is {self.positions}, expected between 0 and {MAX_SAMPLES}")
+        if not 0.0 <= self.cull <= 1.0:
+            raise SceneError(f"cull is {self.cull:g}, expected between 0 and 1")
 
 
 @dataclass(frozen=True, slots=True)

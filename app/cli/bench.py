@@ -20,6 +20,7 @@ import typer
 from rich.table import Table
 
 from app.cli.common import (
+    CullOption,
     EverythingOption,
     SizeOption,
     Steps,
@@ -37,7 +38,7 @@ from app.files import check_output, replace_file
 from app.measure.entries import Entry
 from app.measure.errors import Errors, Exact, mean_evaluations
 from app.measure.times import Quartiles, measure_in_turn
-from app.plan_rows import format_bytes
+from app.plan_rows import format_bytes, share_text
 from app.render.techniques import AUTOMATIC, suited_technique, technique_of
 from app.scene import ALPHA_MIN, Material, RenderSettings, Scene, Shot
 
@@ -60,7 +61,8 @@ class Row:
     ``alpha`` is what all materials were given, None where they keep their own; ``errors``
     are those of specular and diffuse radiance, empty where none were asked for; so are
     ``evaluations`` of the contour integral, their mean over pixels that show surfaces.
-    ``everything`` says that nothing was left out, ``bytes`` what was allocated.
+    ``cull`` is the share of display white that skipped lights may add up to; ``everything``
+    says that nothing was left out, ``bytes`` what was allocated.
     """
 
     scene: str
@@ -70,6 +72,7 @@ class Row:
     wall: Quartiles
     errors: dict[str, Errors]
     evaluations: float | None
+    cull: float
     everything: bool
     bytes: int
 
@@ -128,6 +131,7 @@ def bench(
             show_default=False,
         ),
     ] = 0,
+    cull: CullOption = 0.0,
     everything: EverythingOption = False,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON too.")
@@ -144,6 +148,8 @@ def bench(
     mean, 95th percentile and largest error of specular and diffuse radiance, of
     lights with radiance 1 on a white material; and how often a pixel evaluates the
     integral along the outlines, which no other program on the machine can disturb.
+
+    --cull measures each technique a second time, skipping lights too faint to see.
 
     --everything measures each row a second time, frame by frame in turn, with one
     program for all scenes and nothing left out: what the scene spares.
@@ -162,7 +168,7 @@ def bench(
     if json_file is not None:
         check_output(json_file, "a table of figures", (".json",))
     loaded = [(name, named_scene(name)) for name in scenes]
-    jobs = list(_jobs(loaded, techniques, alphas, width, height))
+    jobs = list(_jobs(loaded, techniques, alphas, cull, width, height))
     with headless_renderer() as (ctx, renderer), ExitStack() as stack:
         device = str(ctx.info["GL_RENDERER"])
         if is_software(device):
@@ -179,13 +185,17 @@ def bench(
                 measured = measure_in_turn(ctx, renderers, job.shot, warm_up, repeats, one_more)
                 for one, (passes, wall) in zip(renderers, measured, strict=True):
                     errors, evaluations, held = {}, None, sum(one.allocated().values())
-                    if points and job.technique != BASELINE and not one.everything:
+                    share = job.shot.settings.cull
+                    counts = (points or cull) and job.technique != BASELINE
+                    # Points to be probed are shaded by all lights.
+                    if points and counts and not one.everything and not share:
                         errors = exact.errors(job.shot, Entry(job.shot.settings.technique))
+                    if counts and not one.everything:
                         evaluations = mean_evaluations(one, job.shot)
                     rows.append(
                         Row(
                             job.scene, job.technique, job.alpha, passes, wall, errors,
-                            evaluations, one.everything, held,
+                            evaluations, share, one.everything, held,
                         )
                     )  # fmt: skip
         source = renderer.timing_source
@@ -231,10 +241,11 @@ def _jobs(
     scenes: list[tuple[str, Scene]],
     techniques: list[str],
     alphas: list[float],
+    cull: float,
     width: int,
     height: int,
 ) -> Iterator[Job]:
-    """Yield each scene's baseline, then for each alpha its techniques."""
+    """Yield each scene's baseline, then for each alpha its techniques, without and with culling."""
     for name, scene in scenes:
         black = _with_materials(scene, diffuse=(0.0, 0.0, 0.0), f0=(0.0, 0.0, 0.0))
         first = RenderSettings(technique=techniques[0])
@@ -245,9 +256,9 @@ def _jobs(
             for technique in techniques:
                 own = technique_of(glossy, technique)
                 label = own if technique == AUTOMATIC else technique
-                yield Job(
-                    name, label, alpha, Shot(glossy, RenderSettings(technique=own), width, height)
-                )
+                for share in (0.0, cull) if cull else (0.0,):
+                    settings = RenderSettings(technique=own, cull=share)
+                    yield Job(name, label, alpha, Shot(glossy, settings, width, height))
 
 
 def _with_materials(scene: Scene, **changes: Any) -> Scene:
@@ -272,22 +283,29 @@ def _table(rows: list[Row], title: str) -> Table:
     lobes = list(dict.fromkeys(lobe for row in rows for lobe in row.errors))
     for lobe in lobes:
         table.add_column(f"{lobe} error: mean, p95, max", justify="right", no_wrap=True)
-    if lobes:
+    has_counts = any(row.evaluations is not None for row in rows)
+    if has_counts:
         table.add_column("evaluations", justify="right", no_wrap=True)
     for row in rows:
         count = "-" if row.evaluations is None else f"{row.evaluations:.1f}"
         table.add_row(
             Path(row.scene).stem,
-            f"{row.technique}, everything" if row.everything else row.technique,
+            _label(row),
             *(["-" if row.alpha is None else f"{row.alpha:g}"] if has_alpha else []),
             *(_cell(row.passes.get(name)) for name in names),
             _cell(row.wall),
             str(row.wall.repeats),
             *([format_bytes(row.bytes)] if has_memory else []),
             *(_error_cell(row.errors.get(lobe)) for lobe in lobes),
-            *([count] if lobes else []),
+            *([count] if has_counts else []),
         )
     return table
+
+
+def _label(row: Row) -> str:
+    """Return what the technique's column says."""
+    culls = [f"cull {share_text(row.cull)}"] if row.cull else []
+    return ", ".join([row.technique, *culls, *(["everything"] if row.everything else [])])
 
 
 def _cell(figures: Quartiles | None) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -71,6 +73,19 @@ def whole_number(option: str, least: int, most: int) -> Callable[[str | int], in
     return read
 
 
+def share_of_white(value: str | float) -> float:
+    """Read ``--cull``: a number from 0 to 1, or a fraction such as 1/1024."""
+    try:
+        share = float(Fraction(value))
+    except (ValueError, ZeroDivisionError):
+        share = math.nan
+    if not 0.0 <= share <= 1.0:
+        raise InputError(
+            f"--cull is '{value}', expected a number from 0 to 1 or a fraction such as 1/4096"
+        )
+    return share
+
+
 def list_techniques(value: list[str] | str | None) -> list[str] | str | None:
     """Print the techniques and leave, if one of those asked for is ``help``."""
     names = [value] if isinstance(value, str) else value or []
@@ -104,6 +119,17 @@ TechniqueOption = Annotated[
         help="How to shade; 'help' lists the techniques.",
         callback=list_techniques,
         is_eager=True,
+    ),
+]
+CullOption = Annotated[
+    float,
+    typer.Option(
+        "--cull",
+        metavar="SHARE",
+        help="Skip lights while all skipped at a pixel stay below this share of display white, "
+        "such as 1/4096.",
+        parser=share_of_white,
+        show_default="off",
     ),
 ]
 EverythingOption = Annotated[

@@ -10,6 +10,7 @@ import typer
 
 from app.cli.common import (
     DEFAULT_SIZE,
+    CullOption,
     EverythingOption,
     FailureError,
     SamplesOption,
@@ -34,6 +35,7 @@ def explain(
     size: SizeOption = DEFAULT_SIZE,
     samples: SamplesOption = 16,
     technique: TechniqueOption = AUTOMATIC,
+    cull: CullOption = 0.0,
     everything: EverythingOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
@@ -49,7 +51,7 @@ def explain(
     """
     width, height = image_size(size)
     suited_technique(technique, anisotropic=False)
-    settings = RenderSettings(technique=technique, samples=samples)
+    settings = RenderSettings(technique=technique, samples=samples, cull=cull)
     shot = Shot(named_scene(scene), settings, width, height)
     limits = _limits()
     plan = make_plan(shot, limits, shader_roots())

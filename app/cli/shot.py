@@ -9,6 +9,7 @@ import typer
 
 from app.cli.common import (
     DEFAULT_SIZE,
+    CullOption,
     SamplesOption,
     SceneArgument,
     SizeOption,
@@ -34,6 +35,7 @@ def shot(
     size: SizeOption = DEFAULT_SIZE,
     samples: SamplesOption = 16,
     technique: TechniqueOption = AUTOMATIC,
+    cull: CullOption = 0.0,
     view: Annotated[
         str,
         typer.Option(
@@ -51,6 +53,9 @@ def shot(
     --view cost shows how often each pixel evaluated the contour integral, as
     colours with a legend in a .png, as numbers in an .exr.
 
+    --cull leaves out lights that cannot be seen: a bound of what each may add is
+    certified, and all that is skipped at a pixel adds up to no more than asked for.
+
     \b
     Example:
       ltc-viewer shot scene.json -o picture.png --size 1920x1080 --samples 64
@@ -60,7 +65,7 @@ def shot(
     check_image_path(output)
     if view not in PIXEL_VIEWS:
         raise InputError(f"--view is '{view}', {expected_one_of(view, PIXEL_VIEWS)}")
-    settings = RenderSettings(technique, samples, view)
+    settings = RenderSettings(technique, samples, view, cull=cull)
     wanted = Shot(named_scene(scene), settings, width, height)
     with headless_renderer() as (ctx, renderer):
         with Steps("rendering", samples) as steps:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from app.panels.widgets import choice, heading, label, slider, tooltip
+from app.plan_rows import share_text
 from app.scene import PIXEL_VIEWS, TONE_MAPS, Display, RenderSettings
 
 SAMPLE_COUNTS = (1, 4, 8, 16, 32, 64, 128, 256)
@@ -19,6 +20,14 @@ _TONE_MAP_TIP = (
 _VIEW_TIP = (
     "radiance: the picture; cost: how often each pixel evaluates the integral along the "
     "lights' outlines, in colours"
+)
+
+
+CULL_SHARES = (0.0, 1 / 4096, 1 / 1024, 1 / 256)
+
+_CULL_TIP = (
+    "Lights too faint to see: what is skipped at a pixel never adds up to more than this, at the "
+    "scene's exposure. Many lights take less time; techniques ltc and ggx"
 )
 
 
@@ -48,8 +57,17 @@ def display_panel(
     technique = settings.technique
     if len(techniques) > 1:
         technique = choice("Technique", technique, techniques, "How lights are integrated")
+    cull = _cull_choice(settings.cull)
     view = choice("View", settings.view, PIXEL_VIEWS, _VIEW_TIP)
     return (
         replace(display, exposure=exposure, tone_map=tone_map),
-        replace(settings, samples=samples, technique=technique, view=view),
+        replace(settings, samples=samples, technique=technique, view=view, cull=cull),
     )
+
+
+def _cull_choice(cull: float) -> float:
+    """Draw the list of how much light may be skipped; return the share of display white."""
+    names = {share: f"up to {share_text(share)} of white" if share else "nothing"
+             for share in (*CULL_SHARES, cull)}  # fmt: skip
+    chosen = choice("Skip", names[cull], tuple(dict.fromkeys(names.values())), _CULL_TIP)
+    return next(share for share, name in names.items() if name == chosen)

@@ -12,7 +12,7 @@ from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from app.render.features import LightingFeatures, LightNeeds
-from app.render.pack import TEXELS_PER_LIGHT, TEXELS_PER_NODE
+from app.render.pack import TEXELS_PER_EDGE, TEXELS_PER_LIGHT, TEXELS_PER_NODE
 
 KEPT = {
     "count": "how many lights there are is the scene's",
@@ -39,12 +39,14 @@ def everything_on(features: LightingFeatures) -> LightingFeatures:
     # Edges as a flat list of curves that are straight, not as a tree: a tree takes chords
     # where they are within `CHORD_ERROR`, and the picture would change by as much.
     has_list = lights.curves == 1
-    texels = TEXELS_PER_LIGHT * lights.count + TEXELS_PER_NODE * lights.parts
+    texels = (TEXELS_PER_LIGHT + 1) * lights.count + (
+        TEXELS_PER_NODE if lights.curved or has_list else TEXELS_PER_EDGE
+    ) * lights.parts
     forced_lights = _all_on(
         lights,
         {
             "curves": "whole" if has_list else lights.curves,
-            "texels": texels if has_list else lights.texels,
+            "texels": texels,
             "uniform_texels": 0,
         },
     )

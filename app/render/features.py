@@ -70,13 +70,15 @@ class LightNeeds:
     """The lights of a scene that reach surfaces.
 
     ``curves`` says how curves are packed, ``parts`` counts what they then are:
-    edges, nodes of trees, or the curves themselves; ``uniform_texels`` is the uniform
+    edges, nodes of trees, or the curves themselves; ``bounded`` is whether the rectangle
+    around each is packed too; ``uniform_texels`` is the uniform
     block's array length, 0 where the lights need a texture (or there are none).
     """
 
     count: int
     parts: int
     curves: CurveForm
+    bounded: bool
     texels: int
     one_sided: bool
     two_sided: bool
@@ -85,7 +87,11 @@ class LightNeeds:
 
     @classmethod
     def of(
-        cls, lights: Sequence[AreaLight], limits: Limits, technique: str = DEFAULT_TECHNIQUE
+        cls,
+        lights: Sequence[AreaLight],
+        limits: Limits,
+        technique: str = DEFAULT_TECHNIQUE,
+        bounded: bool = False,
     ) -> LightNeeds:
         """Raise `InputError` if the lights are more, or larger, than the machine can hold."""
         geometries = [light_geometry(light) for light in lights]
@@ -98,7 +104,7 @@ class LightNeeds:
         curved = not isinstance(curves, int)
         parts = sum(part_count(item, curves) for item in shining)
         size = TEXELS_PER_NODE if curved else TEXELS_PER_EDGE
-        texels = TEXELS_PER_LIGHT * len(lights) + size * parts
+        texels = (TEXELS_PER_LIGHT + int(bounded)) * len(lights) + size * parts
         if texels > limits.storage_texels:
             raise InputError(
                 f"lights: {len(lights)} lights with {parts} {'curves' if curved else 'edges'} "
@@ -109,6 +115,7 @@ class LightNeeds:
             len(lights),
             parts,
             curves,
+            bounded,
             texels,
             any(not light.two_sided for light in shining),
             any(light.two_sided for light in shining),
@@ -170,6 +177,8 @@ class LightingFeatures:
         Some glossy material is anisotropic, and the technique shades it so.
     counts : bool
         Pixels get the number of evaluations instead of radiance.
+    culls : bool
+        Lights that a bound puts below what can be seen are skipped, which the user asked for.
     anisotropic : bool
         Lobes are looked up in the anisotropic tables, where the technique has tables.
     """
@@ -184,6 +193,7 @@ class LightingFeatures:
     tangents: bool
     counts: bool
     anisotropic: bool
+    culls: bool
 
     @classmethod
     def of(
@@ -193,9 +203,11 @@ class LightingFeatures:
         limits: Limits,
         technique: str = DEFAULT_TECHNIQUE,
         view: PixelView = "radiance",
+        culls: bool = False,
     ) -> LightingFeatures:
         """Raise `InputError` if lights or objects are more than the machine can hold."""
-        lights = LightNeeds.of(scene.lights, limits, technique)
+        culls = culls and find_technique(technique).culls
+        lights = LightNeeds.of(scene.lights, limits, technique, culls)
         shines = lights.one_sided or lights.two_sided
         used = scene.object_materials()
         if TEXELS_PER_MATERIAL * len(used) > limits.storage_texels:
@@ -227,6 +239,7 @@ class LightingFeatures:
             anisotropic,
             view == "cost",
             anisotropic,
+            culls and (specular or diffuse),
         )
 
     @property
@@ -262,6 +275,7 @@ class LightingFeatures:
             "PROBES": 0,
             "COUNTS_EVALUATIONS": int(self.counts),
             "HAS_TANGENTS": int(self.tangents),
+            "CULLS": int(self.culls and find_technique(self.technique).culls),
             **technique_defines(self.technique, self.anisotropic),
             "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
             "MATERIAL_TEXELS": self.uniform_materials,
@@ -305,6 +319,7 @@ def probe_defines(lights: LightNeeds, technique: str, anisotropic: bool) -> dict
         "HAS_DIFFUSE": 1,
         "PROBES": 1,
         "COUNTS_EVALUATIONS": 0,
+        "CULLS": 0,
         **technique_defines(lights.technique(technique), anisotropic),
         **lights.defines(),
     }

@@ -8,6 +8,7 @@ from app.render.features import LightingFeatures
 from app.render.light_shapes import curve_texels, has_triangles
 from app.render.needs import FORMAT_BYTES
 from app.render.tables import table_textures
+from app.render.techniques import find_technique
 from app.scene import TONE_MAPS, Shot
 
 
@@ -67,6 +68,14 @@ def left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
         leave("light from back sides", "no light is two-sided")
     if features.shades and not lights.one_sided:
         leave("test for dark sides", "every light is two-sided")
+    if features.shades and not features.culls:
+        can = find_technique(features.technique).culls
+        leave(
+            "bounds of faint lights",
+            "no light is to be skipped (--cull)"
+            if can
+            else f"technique {features.technique} integrates every light",
+        )
     if features.lit and not features.accumulates:
         leave(
             "second radiance attachment and averaging",

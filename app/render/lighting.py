@@ -71,7 +71,7 @@ class LightingPass:
     def set_lights(self, lights: Sequence[AreaLight], needs: LightNeeds) -> None:
         """Hold the texels of ``lights``."""
         self._light_count = len(lights)
-        self._lights.update(pack_lights(lights, needs.curves), needs.uniform_texels)
+        self._lights.update(pack_lights(lights, needs.curves, needs.bounded), needs.uniform_texels)
 
     def set_materials(self, materials: Sequence[Material], uniform_texels: int) -> None:
         """Hold one record per object."""
@@ -118,6 +118,7 @@ class LightingPass:
         offset: tuple[float, float],
         history: moderngl.Texture | None,
         sample: int,
+        faint: float = 0.0,
     ) -> None:
         """Write the radiance of one sample, or its mean with ``history``, to ``target``.
 
@@ -129,6 +130,8 @@ class LightingPass:
             Where in its pixel the G-buffer's sample lies, from the centre [pixels].
         history : texture or None
             The mean of the ``sample`` samples before this one.
+        faint : float
+            Radiance that all that is skipped at a pixel may add up to.
         """
         width, height = target.size
         begin_pass(target, target.size)
@@ -143,6 +146,7 @@ class LightingPass:
             history.use(HISTORY)
         set_uniform(program, "sample_weight", 1.0 / (sample + 1))
         set_uniform(program, "sample_index", sample)
+        set_uniform(program, "faint_radiance", faint)
         corner = (
             frame.forward
             + (2.0 * offset[0] / width - 1.0) * frame.right

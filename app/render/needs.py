@@ -58,18 +58,20 @@ def needs_of(
     limits: Limits,
     technique: str = DEFAULT_TECHNIQUE,
     view: PixelView = "radiance",
+    culls: bool = False,
     everything: bool = False,
 ) -> Needs:
     """Return what a scene needs with ``samples`` per pixel.
 
-    With ``everything`` nothing is left out (`app.render.everything`).
+    ``culls``: whether faint lights are to be skipped. With ``everything`` nothing is left
+    out (`app.render.everything`).
 
     Raises
     ------
     InputError
         If lights or objects are more than the machine can hold.
     """
-    lighting = LightingFeatures.of(scene, samples, limits, technique, view)
+    lighting = LightingFeatures.of(scene, samples, limits, technique, view, culls)
     if everything:
         lighting = everything_on(lighting)
     outlines = curve_texels(scene.lights)

@@ -18,7 +18,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from app.curves import derivative, evaluate, is_straight, line_as_cubic
+from app.curves import bounds, derivative, evaluate, is_straight, line_as_cubic
 from app.errors import InputError
 from app.outline import boundary, resolve
 from app.render.caching import ByteCache
@@ -212,22 +212,45 @@ def edges_of(loops: Sequence[FloatArray]) -> FloatArray:
 
 
 def pack_lights(
-    lights: Sequence[AreaLight], curves: CurveForm | None = None
+    lights: Sequence[AreaLight], curves: CurveForm | None = None, bounded: bool = False
 ) -> NDArray[np.float32]:
     """Return (n, 4) float32 texels: all headers, then all edges, or all nodes.
 
     If one light has curves (`has_curves`) every light's outline becomes a tree, so
     that one walk serves all, unless ``curves`` says otherwise. A light without
-    radiance keeps its header and gets no outline: nothing to integrate.
+    radiance keeps its header and gets no outline: nothing to integrate. ``bounded``
+    puts a texel before every outline, the rectangle around it (`light_bounds`).
     """
     form: CurveForm = ("tree" if has_curves(lights) else 1) if curves is None else curves
     packed = [_packed_light(light, form) for light in lights]
     header = np.concatenate([np.zeros(0, LIGHT_HEADER), *(record for record, _ in packed)])
-    counts = np.array([len(parts) for _, parts in packed], dtype=np.int64)
+    outlines = [parts for _, parts in packed]
+    if bounded:
+        outlines = [
+            np.concatenate([light_bounds(light)[None], parts])
+            for light, parts in zip(lights, outlines, strict=True)
+        ]
+    counts = np.array([len(parts) for parts in outlines], dtype=np.int64)
     before = np.cumsum(counts) - counts
-    header["first_part"] = TEXELS_PER_LIGHT * len(lights) + before
+    header["first_part"] = TEXELS_PER_LIGHT * len(lights) + before + int(bounded)
     texels = header.view(np.float32).reshape(-1, 4)
-    return np.concatenate([texels, *(parts for _, parts in packed)])
+    return np.concatenate([texels, *outlines])
+
+
+def light_bounds(light: AreaLight) -> NDArray[np.float32]:
+    """Return (least s, least t, greatest s, greatest t) about a light's origin [m], (4,) float32.
+
+    Rounded outwards, so that all of the outline as the shader sees it is inside.
+    """
+    geometry = light_geometry(light)
+    if not geometry.loops:
+        return np.zeros(4, np.float32)
+    corners = np.concatenate(
+        [np.concatenate(bounds(loop)) if loop.ndim == 3 else loop for loop in geometry.loops]
+    )
+    margin = 1e-6 * geometry.radius
+    low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
+    return np.concatenate([low, high]).astype(np.float32)
 
 
 def part_count(light: AreaLight, curves: CurveForm) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.plan_rows import PlanRow, PlanSection, format_bytes, section_lines
+from app.plan_rows import PlanRow, PlanSection, format_bytes, section_lines, share_text
 from app.render.features import LightingFeatures, Limits
 from app.render.gbuffer import load_meshes, mesh_bytes
 from app.render.left_out import LeftOut, left_out
@@ -162,7 +162,9 @@ def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path], everything: boo
     """
     scene, settings = shot.scene, shot.settings
     technique = technique_of(scene, settings.technique)
-    needs = needs_of(scene, settings.samples, limits, technique, settings.view, everything)
+    needs = needs_of(
+        scene, settings.samples, limits, technique, settings.view, settings.cull > 0.0, everything
+    )
     features = needs.lighting
     pixels = shot.width * shot.height
     samples = "1 sample" if settings.samples == 1 else f"{settings.samples} samples"
@@ -257,6 +259,9 @@ def _passes(shot: Shot, features: LightingFeatures) -> Iterator[tuple[str, str]]
                 f"{' and '.join(lobes)} of {counted(features.lights.count, 'light')} "
                 f"with {counted(features.lights.parts, features.lights.part_name)}"
             )
+        if features.culls:
+            share = share_text(shot.settings.cull)
+            does.append(f"but for lights that add up to less than {share} of white")
         if features.shapes:
             does.append("the radiance of visible lights")
         yield "lighting", f"{', '.join(does)}{times}"

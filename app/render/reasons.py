@@ -71,7 +71,8 @@ def resource_reason(name: str, shot: Shot, features: LightingFeatures) -> str:
         "light shapes": "visible lights with edges only",
         "light curves": "visible lights with curves",
         "lights": f"{counted(len(scene.lights), 'light')}, "
-        f"{counted(features.lights.parts, features.lights.part_name)}",
+        f"{counted(features.lights.parts, features.lights.part_name)}"
+        f"{', a rectangle around each' if features.lights.bounded else ''}",
         "materials": f"{counted(len(scene.objects), 'object')}, a record each",
     }
     return fixed.get(name, "")

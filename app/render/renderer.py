@@ -72,6 +72,8 @@ class _Seen:
             and mine.settings.technique == other.settings.technique
             and mine.settings.view == other.settings.view
             and mine.settings.positions == other.settings.positions
+            and mine.settings.cull == other.settings.cull
+            and (not mine.settings.cull or a.display.exposure == b.display.exposure)
             and all(
                 getattr(a, part) is getattr(b, part) or getattr(a, part) == getattr(b, part)
                 for part in ("camera", "materials", "objects", "lights")
@@ -187,9 +189,10 @@ class Renderer:
         self._timers = PassTimers(ctx)
         self._cpu_ms = 0.0
         self._held: Scene | None = None
-        self._held_lights: tuple[object, tuple[CurveForm, int]] | None = None
+        self._held_lights: tuple[object, tuple[CurveForm, bool, int]] | None = None
         self._held_materials: tuple[object, object, int] | None = None
         self._needs: Needs | None = None
+        self._needs_key: tuple[str, bool, PixelView, bool] | None = None
         self._seen: _Seen | None = None
         self._stale = False
         self._samples = 0
@@ -572,7 +575,7 @@ class Renderer:
             )
         scene = shot.scene
         technique = technique_of(scene, shot.settings.technique)
-        needs = self._needs_of(scene, samples, technique, shot.settings.view)
+        needs = self._needs_of(shot, samples, technique)
         features = needs.lighting
         self._stale = True
         for spec in needs.programs:
@@ -608,20 +611,20 @@ class Renderer:
         self._displayed = None
         self._cpu_ms = 1e3 * (time.perf_counter() - start)
 
-    def _needs_of(self, scene: Scene, samples: int, technique: str, view: PixelView) -> Needs:
+    def _needs_of(self, shot: Shot, samples: int, technique: str) -> Needs:
         """Return `needs_of`, from the last time if nothing that it depends on is new."""
+        scene, view, culls = shot.scene, shot.settings.view, shot.settings.cull > 0.0
+        key = (technique, samples > 1, view, culls)
         if self._needs is not None and self._seen is not None and not self._stale:
             seen = self._seen.shot.scene
-            before = technique_of(seen, self._seen.shot.settings.technique)
-            same = before == technique and all(
+            same = self._needs_key == key and all(
                 getattr(seen, part) is getattr(scene, part)
                 for part in ("materials", "objects", "lights")
             )
-            lighting = self._needs.lighting
-            same = same and lighting.counts == (view == "cost")
-            if same and lighting.accumulates == (samples > 1):
+            if same:
                 return self._needs
-        return needs_of(scene, samples, self.limits, technique, view, self.everything)
+        self._needs_key = key
+        return needs_of(scene, samples, self.limits, technique, view, culls, self.everything)
 
     def _add_sample(self) -> None:
         assert self._seen is not None
@@ -650,6 +653,7 @@ class Renderer:
                     offset,
                     self._targets.texture(older) if older else None,
                     self._samples,
+                    _faint_radiance(shot),
                 )
             self.lighting_passes += 1
         else:
@@ -674,7 +678,7 @@ class Renderer:
 
     def _hold_lights(self, scene: Scene, needs: LightNeeds) -> None:
         held = self._held_lights
-        layout = (needs.curves, needs.uniform_texels)
+        layout = (needs.curves, needs.bounded, needs.uniform_texels)
         if held is None or held[0] is not scene.lights or held[1] != layout:
             self._lighting.set_lights(scene.lights, needs)
             self._held_lights = (scene.lights, layout)
@@ -693,6 +697,11 @@ class Renderer:
     @property
     def _view(self) -> PixelView:
         return "radiance" if self._seen is None else self._seen.shot.settings.view
+
+
+def _faint_radiance(shot: Shot) -> float:
+    """Return the radiance that all that is skipped may add up to: a share of display white."""
+    return float(shot.settings.cull * 2.0**-shot.scene.display.exposure)
 
 
 def _top_down(texture: moderngl.Texture, dtype: DTypeLike) -> NDArray[Any]:

@@ -53,6 +53,8 @@ class Technique:
         a technique that does not is only not 0, which leaves out the tree's own rule.
     has_own_diffuse : bool
         Whether its diffuse part differs from the form factors that the others share.
+    culls : bool
+        Whether it can skip lights that a bound puts below what can be seen.
     parameter : Parameter, optional
         What a number behind its name means.
     """
@@ -63,6 +65,7 @@ class Technique:
     curves: Literal["tree", "whole", "edges"] = "tree"
     curve_rule: int = 0
     is_sampled: bool = False
+    culls: bool = False
     has_own_diffuse: bool = False
     parameter: Parameter | None = None
 
@@ -74,6 +77,7 @@ TECHNIQUES: dict[str, Technique] = {
         anisotropic=True,
         has_tables=True,
         parameter=Parameter("quadrature nodes a panel of a curve", 2, 6, 4),
+        culls=True,
     ),
     "ggx": Technique(
         "GGX itself as a contour integral in half-vector space, anisotropic, without tables; "
@@ -81,6 +85,7 @@ TECHNIQUES: dict[str, Technique] = {
         anisotropic=True,
         has_tables=False,
         parameter=Parameter("quadrature nodes an edge", 1, 4, 2),
+        culls=True,
     ),
     "adaptive": Technique(
         "ltc with curves halved until triangles between chords add little, as published by Kuge "
@@ -89,6 +94,7 @@ TECHNIQUES: dict[str, Technique] = {
         has_tables=True,
         curves="whole",
         curve_rule=1,
+        culls=True,
     ),
     "adaptive-extrapolated": Technique(
         "adaptive with the same chords, extrapolated to the curve",
@@ -96,6 +102,7 @@ TECHNIQUES: dict[str, Technique] = {
         has_tables=True,
         curves="whole",
         curve_rule=2,
+        culls=True,
     ),
     "uniform": Technique(
         "ltc with every curve cut into the same number of edges",
@@ -103,6 +110,7 @@ TECHNIQUES: dict[str, Technique] = {
         has_tables=True,
         curves="edges",
         parameter=Parameter("edges a curve", 1, 4096, 18),
+        culls=True,
     ),
     "reference": Technique(
         "GGX and Lambert estimated by random directions, without bias but with noise: what "

@@ -9,6 +9,9 @@
 #if HAS_SPECULAR
 #include "ggx/polygon.glsl"
 #endif
+#if CULLS
+#include "ggx/bound.glsl"
+#endif
 
 // Integrals of a light of radiance 1 at a point.
 struct GgxTerms {
@@ -17,7 +20,11 @@ struct GgxTerms {
 };
 
 GgxTerms ggx_terms(
-    PlanarLight light, vec3 position, mat3 world_from_tangent, vec3 wo_tangent, vec2 alpha)
+    PlanarLight light, vec3 position, mat3 world_from_tangent, vec3 wo_tangent, vec2 alpha
+#if CULLS
+    , MaterialSample material
+#endif
+    )
 {
     GgxTerms terms = GgxTerms(vec2(0.0), 0.0);
     vec3 normal = world_from_tangent[2];
@@ -26,14 +33,32 @@ GgxTerms ggx_terms(
         return terms;
     }
     mat3 tangent_from_world = transpose(world_from_tangent);
+#if HAS_DIFFUSE
+    CosineTransform diffuse = CosineTransform(tangent_from_world, tangent_from_world);
+#endif
+#if CULLS
+    vec2 half_sides;
+    vec3 to_middle = way_to_rectangle(light, plane, half_sides);
+#endif
 #if HAS_SPECULAR
     if (wo_tangent.z > 0.0) {
-        terms.specular = ggx_light_specular(
-            light, plane, normal, tangent_from_world, ggx_view(wo_tangent, alpha));
+        GgxView view = ggx_view(wo_tangent, alpha);
+#if CULLS
+        vec2 most = ggx_bound(tangent_from_world * to_middle,
+                              half_sides.x * (tangent_from_world * light.u),
+                              half_sides.y * (tangent_from_world * light.v), view);
+        // f0 (1 - (1 - wo.h)^5) + (1 - wo.h)^5, at most.
+        vec3 fresnel = mix(material.f0, vec3(1.0), most.y);
+        if (!is_skipped(most.x * greatest(light.radiance * fresnel)))
+#endif
+        terms.specular = ggx_light_specular(light, plane, normal, tangent_from_world, view);
     }
 #endif
 #if HAS_DIFFUSE
-    CosineTransform diffuse = CosineTransform(tangent_from_world, tangent_from_world);
+#if CULLS
+    if (!is_skipped(greatest(light.radiance * material.diffuse) *
+                    form_factor_bound(diffuse, light, to_middle, half_sides)))
+#endif
     // A point on the outline itself has no defined form factor, but not above 1.
     terms.diffuse = clamp(
         light_winding(plane) * light_form_factor(light, diffuse, plane, normal), 0.0, 1.0);
@@ -53,8 +78,14 @@ vec3 shade_lights(
     vec3 radiance = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
+#if CULLS
+        allow_for_a_light();
+        GgxTerms terms = ggx_terms(
+            light, position, world_from_tangent, wo_tangent, material.alpha, material);
+#else
         GgxTerms terms =
             ggx_terms(light, position, world_from_tangent, wo_tangent, material.alpha);
+#endif
         vec3 specular =
             material.f0 * (terms.specular.x - terms.specular.y) + has_lobe * terms.specular.y;
         radiance += light.radiance * (specular + material.diffuse * terms.diffuse);

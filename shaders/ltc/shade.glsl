@@ -5,6 +5,9 @@
 #include "common/light_data.glsl"
 #include "common/material.glsl"
 #include "ltc/contour.glsl"
+#if CULLS
+#include "ltc/bound.glsl"
+#endif
 #if TAKES_TANGENT
 #include "common/tangent_frame.glsl"
 #endif
@@ -50,8 +53,13 @@ SurfacePoint surface_point(vec3 position, vec3 normal, vec3 tangent, vec3 wo, ve
 #include "ltc/published_clip.glsl"
 #else
 // Specular and diffuse form factors of a light at a point; both zero where it
-// shows its dark side.
-vec2 form_factors_at(PlanarLight light, SurfacePoint point, CosineTransform specular)
+// shows its dark side. `weights` turn them into radiance: what is too faint is left at zero.
+vec2 form_factors_at(
+    PlanarLight light, SurfacePoint point, CosineTransform specular
+#if CULLS
+    , vec2 weights
+#endif
+    )
 {
     vec3 normal = point.world_from_shading[2];
     PlaneView view = plane_view(light, point.position);
@@ -63,18 +71,45 @@ vec2 form_factors_at(PlanarLight light, SurfacePoint point, CosineTransform spec
     mat3 shading_from_world = transpose(point.world_from_shading);
     CosineTransform diffuse = CosineTransform(shading_from_world, shading_from_world);
 #endif
+#if CULLS
+    vec2 half_sides;
+    vec3 to_middle = way_to_rectangle(light, view, half_sides);
+    bvec2 skipped = bvec2(true);
+#if HAS_SPECULAR
+    skipped.x =
+        is_skipped(weights.x * form_factor_bound(specular, light, to_middle, half_sides));
+#endif
+#if HAS_DIFFUSE
+    skipped.y =
+        is_skipped(weights.y * form_factor_bound(diffuse, light, to_middle, half_sides));
+#endif
+    if (all(skipped)) {
+        return factors;
+    }
+#endif
 #if HAS_CURVES && HAS_SPECULAR && HAS_DIFFUSE && !CURVE_RULE
+#if CULLS
+    if (skipped.x) {
+        factors.y = light_form_factor(light, diffuse, view, normal);
+    } else
+#endif
     factors = light_form_factors(light, specular, diffuse, view, normal);
 #else
 #if HAS_SPECULAR
 #if CURVE_RULE
     least_triangle = specular_triangle(sqrt(point.alpha.x * point.alpha.y));
 #endif
+#if CULLS
+    if (!skipped.x)
+#endif
     factors.x = light_form_factor(light, specular, view, normal);
 #endif
 #if HAS_DIFFUSE
 #if CURVE_RULE
     least_triangle = DIFFUSE_TRIANGLE;
+#endif
+#if CULLS
+    if (!skipped.y)
 #endif
     factors.y = light_form_factor(light, diffuse, view, normal);
 #endif
@@ -109,7 +144,14 @@ vec3 shade_lights(
     vec3 radiance = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
+#if CULLS
+        allow_for_a_light();
+        vec2 weights = vec2(greatest(light.radiance * reflectance),
+                            greatest(light.radiance * material.diffuse));
+        vec2 factors = form_factors_at(light, point, specular, weights);
+#else
         vec2 factors = form_factors_at(light, point, specular);
+#endif
         radiance += light.radiance * (reflectance * factors.x + material.diffuse * factors.y);
     }
     return radiance;

@@ -36,6 +36,9 @@ uniform vec3 ray_corner;
 uniform vec3 ray_dx;
 uniform vec3 ray_dy;
 uniform int light_count;
+#if CULLS
+uniform float faint_radiance;  // that all that is skipped at a point may add up to
+#endif
 #if TECHNIQUE_REFERENCE
 uniform uint sample_index;
 #endif
@@ -76,6 +79,9 @@ vec3 surface_radiance(vec4 surface)
     vec3 normal = facing_normal(direction_from_octahedral(surface.xy), wo);
     vec3 position = eye + surface.z * ray;
     MaterialSample material = material_of_object(int(surface.w));
+#if CULLS
+    allowance_per_light = faint_radiance / float(light_count);
+#endif
 #if TAKES_TANGENT
     vec3 tangent = material_tangent(ivec2(gl_FragCoord.xy), normal, int(surface.w));
     return shade_lights(

@@ -21,6 +21,7 @@ from app.outline import resolve
 from app.render.pack import pack_lights
 from app.scene import AreaLight, Plane
 from ltc import ggx
+from ltc.bounds import half_vector_bound
 from ltc.polygon import loops_form_factor
 from ltc.resources import resource_path
 from tests.gl.evaluate import evaluate
@@ -46,9 +47,12 @@ TWINS = {
     "double_cosine_of_third",
     "probe_lights",
     "shade_lights",
+    "ggx_bound",
 }
 STAGE = "a stage of the integral, tested whole by the tests of probe_lights"
 GPU_ONLY = {
+    "span_along": "a stage of ggx_bound, tested with it",
+    "half_vector_span": "a stage of ggx_bound, tested with it",
     "ggx_weights": STAGE,
     "add_fan_node": STAGE,
     "add_chord_node": STAGE,
@@ -83,6 +87,7 @@ FEATURES = {
     "COUNTS_EVALUATIONS": 0,
     "HAS_EXACT_FMA": 0,
     "PROBES": 1,
+    "CULLS": 0,
     "GGX_NODES": 2,
 }
 
@@ -536,6 +541,15 @@ def glsl(ctx: moderngl.Context, tmp_path):
     return run
 
 
+@pytest.fixture
+def glsl_bound(ctx, tmp_path):
+    def run(body, inputs):
+        prelude = "vec4 light_texel(int index) { return vec4(0.0); }"
+        return evaluate(ctx, tmp_path, ["ggx/bound.glsl"], body, inputs, FEATURES, prelude=prelude)
+
+    return run
+
+
 def test_tangent_frame(glsl):
     rng = np.random.default_rng(12)
     normal = unit(rng.normal(size=(512, 3)))
@@ -608,6 +622,31 @@ def test_half_vector_cone(glsl):
     local = np.einsum("nij,nj->ni", frame, h)
     residual = np.sum(b * [1.0, 1.0, -1.0] * local**2, axis=1)
     assert np.max(np.abs(residual)) <= 3e-6
+
+
+def test_bound(glsl_bound):
+    """Never below the definition, which is certified; above by what it allows for rounding."""
+    rng = np.random.default_rng(15)
+    count = 4096
+    middle = unit(rng.normal(size=(count, 3))) * np.exp(rng.uniform(-1.5, 3.0, count))[:, None]
+    u = unit(rng.normal(size=(count, 3)))
+    v = unit(np.cross(u, rng.normal(size=(count, 3))))
+    half = np.exp(rng.uniform(np.log(0.01), np.log(3.0), (count, 2, 1)))
+    theta = np.radians(rng.uniform(0.0, 89.0, count))
+    wo = np.stack([np.sin(theta), 0.0 * theta, np.cos(theta)], axis=-1)
+    inputs = {
+        "middle": middle, "u": half[:, 0] * u, "v": half[:, 1] * v, "wo": wo,
+        "alpha": np.exp(rng.uniform(np.log(1e-3), 0.0, (count, 2))),
+    }  # fmt: skip
+    inputs = {name: x.astype(np.float32).astype(np.float64) for name, x in inputs.items()}
+    got = glsl_bound("result.xy = ggx_bound(middle, u, v, ggx_view(wo, alpha));", inputs)
+    middle, u, v, alpha = (inputs[name] for name in ("middle", "u", "v", "alpha"))
+    corners = np.stack([middle - u - v, middle + u - v, middle + u + v, middle - u + v], axis=1)
+    want = half_vector_bound(corners, unit(inputs["wo"]), alpha[:, 0], alpha[:, 1])
+    # Half vectors are sums that cancel near the mirror direction, where they decide nothing.
+    assert np.all(got[:, 0] >= want.one * (1.0 - 1e-3) - 1e-9)
+    assert np.isclose(got[:, 0], want.one, rtol=1e-2, atol=1e-7).mean() > 0.98
+    np.testing.assert_allclose(got[:, 1], want.fresnel, atol=1e-5)  # a root of nearly 0
 
 
 def test_small_functions(glsl):

@@ -16,6 +16,7 @@ from app.render.pack import LIGHT_HEADER
 from app.render.tables import isotropic_textures
 from ltc import table, transform
 from ltc.bezier import sign_changes
+from ltc.bounds import form_factor_bound
 from ltc.polygon import clipped_form_factor
 from ltc.resources import resource_path
 from tests.gl.evaluate import evaluate
@@ -31,6 +32,7 @@ FEATURES = {
     "COUNTS_EVALUATIONS": 0,
     "HAS_EXACT_FMA": 0,
     "PROBES": 1,
+    "CULLS": 0,
 }
 NO_LIGHTS = "vec4 light_texel(int index) { return vec4(0.0); }"
 COUNT = 4096
@@ -56,6 +58,7 @@ TWINS = {
     "cosine_light",
     "next_crossing",
     "sliver_area",
+    "form_factor_bound",
 }
 THROUGH_PROBE = "a stage of the integral, tested whole by test_probe.py"
 THROUGH_CURVES = "a stage of the integral along curves, tested whole by test_curves.py"
@@ -90,6 +93,10 @@ GPU_ONLY = {
     "contour_node": THROUGH_CURVES,
     "node_chord": THROUGH_CURVES,
     "contour_part": THROUGH_CURVES,
+    "extent_bound": "a stage of form_factor_bound, tested with it",
+    "density_bound": "a stage of form_factor_bound, tested with it",
+    "light_rectangle": "reads a texel, tested by test_culling.py",
+    "way_to_rectangle": "from a texel, tested by test_culling.py",
     "closing_edge": THROUGH_PROBE,
     "meet_horizon": THROUGH_PROBE,
     "height_of": THROUGH_PROBE,
@@ -385,6 +392,42 @@ def test_cosine_light_pins_small_lights(glsl):
     far = f32(distance) > np.sqrt(2.0 / 0.01)
     np.testing.assert_allclose(got[far], 1.0 / f32(distance)[far] ** 2, rtol=1e-6)
     assert not got[~far].any()
+
+
+def test_form_factor_bound(glsl):
+    """Never below the definition, which is certified; above by what it allows for rounding."""
+    rng = np.random.default_rng(14)
+    middle = rng.normal(size=(COUNT, 3)) * np.exp(rng.uniform(-2.0, 3.0, COUNT))[:, None]
+    u = rng.normal(size=(COUNT, 3))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(u, rng.normal(size=(COUNT, 3)))
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    half = np.exp(rng.uniform(np.log(0.01), np.log(3.0), (COUNT, 2)))
+    alpha, _, cosine = alphas_and_cosines(rng)
+    inverse = transform.invert(table.load_isotropic().matrix(alpha, cosine))
+    inverse /= np.abs(inverse).max(axis=(1, 2), keepdims=True)
+    inputs = {"middle": f32(middle), "u": f32(u), "v": f32(v), "half_sides": f32(half)}
+    inputs |= {f"row{i}": f32(inverse[:, i]) for i in range(3)}
+    body = """
+        PlanarLight light;
+        light.u = u;
+        light.v = v;
+        light.n = cross(u, v);
+        mat3 points = transpose(mat3(row0, row1, row2));
+        mat3 normals = transpose(mat3(cross(row1, row2), cross(row2, row0), cross(row0, row1)));
+        result.x = form_factor_bound(CosineTransform(points, normals), light, middle, half_sides);
+    """
+    got = glsl("ltc/bound.glsl", body, inputs)[:, 0]
+    matrix = np.stack([inputs[f"row{i}"] for i in range(3)], axis=1)
+    axes = inputs["half_sides"][:, :1] * inputs["u"], inputs["half_sides"][:, 1:] * inputs["v"]
+    want = form_factor_bound(
+        *(np.einsum("nij,nj->ni", matrix, w) for w in (inputs["middle"], *axes))
+    )
+    # Products of rounded terms in float32: a few units of 6e-8 each.
+    assert np.all(got >= want * (1.0 - 2e-5) - 1e-12)
+    close = np.isclose(got, want, rtol=1e-3, atol=1e-9)
+    # The others are around the axis within rounding of an alpha of 1e-4's width.
+    assert close.mean() > 0.99
 
 
 def test_view_aligned_frame(glsl):
