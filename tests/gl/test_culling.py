@@ -35,9 +35,11 @@ TRIANGLE = Outline((PolygonContour(((-0.5, -0.2), (1.5, -0.4), (0.1, 0.6))),))
 
 @pytest.fixture(scope="module")
 def module_renderer(session_context: moderngl.Context) -> Iterator[Renderer]:
-    renderer = Renderer(session_context)
+    with session_context:
+        renderer = Renderer(session_context)
     yield renderer
-    renderer.release()
+    with session_context:
+        renderer.release()
 
 
 @pytest.fixture

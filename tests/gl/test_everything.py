@@ -16,10 +16,12 @@ from tests.gl.scenes import DARK, MATTE, one_light
 
 @pytest.fixture(scope="module")
 def renderers(session_context: moderngl.Context) -> Iterator[tuple[Renderer, Renderer]]:
-    both = Renderer(session_context), Renderer(session_context, everything=True)
+    with session_context:
+        both = Renderer(session_context), Renderer(session_context, everything=True)
     yield both
-    for renderer in both:
-        renderer.release()
+    with session_context:
+        for renderer in both:
+            renderer.release()
 
 
 def compare(renderers: tuple[Renderer, Renderer], shot: Shot) -> tuple[np.ndarray, ...]:

@@ -376,6 +376,28 @@ def see_the_cost(app: Application, out: Path) -> None:
     assert np.array_equal(app.picture(), before)
 
 
+def skip_faint_lights(app: Application, out: Path) -> None:
+    def choose(share: str) -> None:
+        app.act(lambda ctx: ctx.window_focus("//Display"))
+        app.act(lambda ctx: ctx.item_click("//Display/##skip"))
+        app.act(lambda ctx: ctx.item_click(f"//$FOCUSED/{share}"))
+        app.settle()
+
+    before, viewport = app.picture(), app.window.viewport
+    choose("up to 1\\/256 of white")
+    assert viewport.settings.cull == 1 / 256
+    after = app.picture()
+    assert not np.array_equal(after, before)
+    assert np.abs(after.astype(int) - before).max() <= 14, "1/256 near black is 12 of 255 in sRGB"
+    passes = app.window.renderer.lighting_passes
+    app.enter("##exposure", 1.0)
+    app.settle()
+    assert app.window.renderer.lighting_passes > passes, "what is too faint depends on it"
+    app.key(CTRL | imgui.Key.z)
+    choose("nothing")
+    assert np.array_equal(app.picture(), before)
+
+
 def save_reload_compare(app: Application, out: Path) -> None:
     path = out / "saved.json"
     app.drag("vertex 0.2", 30.0, -20.0)
@@ -613,6 +635,7 @@ SCENARIOS = (
     aim_and_look_by_the_context_menu,
     every_panel_edits_the_scene,
     see_the_cost,
+    skip_faint_lights,
     save_reload_compare,
     save_and_open_by_the_dialog,
     same_picture_as_headless,
