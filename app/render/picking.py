@@ -75,10 +75,12 @@ class Picker:
         size: tuple[int, int],
         x: float,
         y: float,
+        faint: float = 0.0,
     ) -> Vec3:
         """Return what ``lighting`` makes of the point there: radiance, or its cost if it counts.
 
-        ``features`` are those of the picture, of a single sample.
+        ``features`` are those of the picture, of a single sample; ``faint`` is the radiance
+        that all that is skipped may add up to.
         """
         target = self._draw(gbuffer, frame, size, x, y)
         if self._shaded is None:
@@ -92,7 +94,7 @@ class Picker:
         pixel = CameraFrame(frame.eye, ray, frame.right / size[0], frame.up / size[1])
         lighting.draw(
             self._shaded, surfaces, tangents if features.tangents else None, features, pixel,
-            (0.0, 0.0), None, 0,
+            (0.0, 0.0), None, 0, faint,
         )  # fmt: skip
         raw = self._shaded.read(components=3, dtype="f4")
         return _vec3(np.frombuffer(raw, dtype=np.float32).astype(np.float64))

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from app.errors import InputError
 from app.render.camera import CameraFrame
-from app.render.features import LightNeeds, Limits
+from app.render.features import LightingFeatures, LightNeeds, Limits
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
 from app.render.needs import ATTACHMENTS, FORMAT_BYTES, Needs, needs_of
@@ -354,7 +354,10 @@ class Renderer:
         self._hold_geometry(shot.scene, self._gbuffer.has_tangents)
         frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
         size = (shot.width, shot.height)
-        return self._picker.shade(self._gbuffer, self._lighting, lighting, frame, size, x, y)
+        self._hold_shading(shot.scene, lighting)
+        return self._picker.shade(
+            self._gbuffer, self._lighting, lighting, frame, size, x, y, _faint_radiance(shot)
+        )
 
     def pick(self, x: float, y: float) -> Hit | None:
         """Return what the last shot shows at pixel coordinates from the top left, or None.
@@ -582,11 +585,9 @@ class Renderer:
             self.programs.get(spec)
         if features.lit:
             self._hold_geometry(scene, features.tangents)
-            self._hold_lights(scene, features.lights)
+            self._hold_shading(scene, features)
         if features.shades:
             self._hold_materials(scene, features.uniform_materials)
-        if features.reads_tables:
-            self._lighting.load_tables(features.anisotropic, features.residual_size)
         self._lighting.drop(
             lights=not features.lit,
             materials=not features.shades,
@@ -641,6 +642,7 @@ class Renderer:
             window = (1.0, 1.0, -2.0 * offset[0] / shot.width, -2.0 * offset[1] / shot.height)
             names = ("gbuffer", "tangents") if needs.lighting.tangents else ("gbuffer",)
             surfaces = self._targets.framebuffer(*names, depth=True)
+            self._hold_shading(shot.scene, needs.lighting)
             with self._timers.measure("gbuffer"):
                 self._gbuffer.draw(surfaces, frame, window)
             with self._timers.measure("lighting"):
@@ -675,6 +677,12 @@ class Renderer:
         if held is None or held.lights is not scene.lights:
             self._gbuffer.set_lights(scene.lights)
         self._held = scene
+
+    def _hold_shading(self, scene: Scene, features: LightingFeatures) -> None:
+        """Hold lights and tables, which a probe may have changed in between."""
+        self._hold_lights(scene, features.lights)
+        if features.reads_tables:
+            self._lighting.load_tables(features.anisotropic, features.residual_size)
 
     def _hold_lights(self, scene: Scene, needs: LightNeeds) -> None:
         held = self._held_lights

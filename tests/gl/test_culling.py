@@ -149,6 +149,26 @@ def test_exposure_counts_only_then(renderer) -> None:
     assert renderer.lighting_passes == passes
 
 
+def test_a_point_is_shaded_as_its_pixel_is(renderer) -> None:
+    """Also after a probe, which holds the lights without their rectangles."""
+    scene = crowd(6)
+    shot = Shot(scene, RenderSettings("ltc", cull=1e-2), *SIZE)
+    renderer.render(shot)
+    whole = renderer.radiance()
+    up = np.array([[0.0, 1.0, 0.0]])
+    renderer.probe(scene, shot.settings, up * 0.0, up, up[:, [1, 0, 2]], up, [[0.1, 0.1]])
+    for x, y in ((48, 50), (20, 40), (60, 30)):
+        np.testing.assert_allclose(
+            renderer.shade_at(x + 0.5, y + 0.5), whole[y, x], rtol=0.0, atol=1e-5 * whole.max()
+        )
+    renderer.probe(scene, shot.settings, up * 0.0, up, up[:, [1, 0, 2]], up, [[0.1, 0.1]])
+    renderer.accumulate(shot, 2)
+    renderer.accumulate(shot, 2)
+    mean = renderer.radiance()
+    renderer.render(replace(shot, settings=replace(shot.settings, samples=2)))
+    np.testing.assert_array_equal(renderer.radiance(), mean)
+
+
 def test_it_is_left_out_unless_asked_for(renderer) -> None:
     scene = crowd(5)
     plain = renderer.plan(Shot(scene, RenderSettings("ltc"), *SIZE))
