@@ -35,6 +35,7 @@ from app.gui.imports import Imports
 from app.gui.keyboard import act_on_keys
 from app.gui.layout import TITLE, docking, runner_params
 from app.gui.lobe_window import LobeWindow
+from app.gui.measuring import Measuring
 from app.gui.menus import edit_menu, file_menu, view_menu
 from app.gui.message_list import draw_messages
 from app.gui.messages import Messages
@@ -83,6 +84,7 @@ class Window:
         self.title = ""
         self._panels = PanelWindows(self.editor, self.imports)
         self._reports = Reports()
+        self.measuring = Measuring()
         self._actions = self._what_actions_do()
         self.params = runner_params()
         self.params.docking_params = docking(self._docked_windows())
@@ -181,6 +183,7 @@ class Window:
 
     def _stop(self) -> None:
         self.exports.release()
+        self.measuring.stop()
         self.viewport.comparison.release()
         self.lobe.release()
         self.renderer.release()
@@ -203,7 +206,10 @@ class Window:
         above_help = 2.4 * imgui.get_font_size() if self.viewport.show_overlays else 0.0
         draw_messages(self.messages, view.x + view.width, view.y + view.height - above_help)
         self._update_title()
-        if not (self.viewport.is_idle and self.lobe.is_settled) or self.exports.is_busy:
+        with self.messages.guard():
+            self.measuring.step(self.renderer.ctx)
+        settled = self.viewport.is_idle and self.lobe.is_settled and not self.measuring.is_busy
+        if not settled or self.exports.is_busy:
             hello_imgui.request_refresh()
 
     def _ask_about_unsaved(self) -> None:
@@ -250,8 +256,15 @@ class Window:
 
     def _performance_window(self) -> None:
         shot = self.viewport.picture.shot
-        if shot is not None:
-            performance_panel(self._reports.times(shot, self.viewport, self.renderer))
+        if shot is None:
+            return
+        times = self._reports.times(shot, self.viewport, self.renderer)
+        asked = performance_panel(times, self.measuring.state(shot))
+        if asked == "measure":
+            seconds = self.viewport.picture.full_size_seconds
+            self.measuring.begin(self.renderer.ctx, shot, seconds)
+        elif asked == "stop":
+            self.measuring.stop()
 
     def _plan_window(self) -> None:
         shot = self.viewport.picture.shot

@@ -27,7 +27,6 @@ from app.cli.common import (
     TechniquesOption,
     headless_renderer,
     image_size,
-    is_software,
     messages,
     named_scene,
     results,
@@ -40,6 +39,7 @@ from app.measure.errors import Errors, Exact, mean_evaluations
 from app.measure.times import Quartiles, measure_in_turn
 from app.plan_rows import format_bytes, share_text
 from app.render.techniques import AUTOMATIC, suited_technique, technique_of
+from app.render.timers import is_software
 from app.scene import ALPHA_MIN, Material, RenderSettings, Scene, Shot
 
 if TYPE_CHECKING:

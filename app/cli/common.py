@@ -252,8 +252,3 @@ class Steps:
             self._progress.start()
         if self._progress is not None:
             self._progress.update(self._task, completed=count)
-
-
-def is_software(renderer_name: str) -> bool:
-    """Tell Mesa's software rasterisers, whose timer queries say little, by their name."""
-    return any(word in renderer_name.lower() for word in ("llvmpipe", "softpipe", "swrast"))

@@ -68,17 +68,6 @@ class _Axis:
         return [t for t in found if self.least <= math.log10(t) <= self.most]
 
 
-def pareto_front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
-    """Tell which pairs no other beats in one number without losing in the other.
-
-    Equal pairs are on the front together.
-    """
-    return [
-        not any(other[0] <= pair[0] and other[1] <= pair[1] and other != pair for other in pairs)
-        for pair in pairs
-    ]
-
-
 def log_plot(
     points: Sequence[Point], title: str, x_label: str, y_label: str, *, labelled: bool = True
 ) -> Drawing | None:

@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from app.cli.drawing import Drawing, Shape
-from app.cli.log_plot import Point, log_plot, pareto_front
+from app.cli.log_plot import Point, log_plot
 from app.cli.report_parts import Row
 from app.measure.entries import Entry, parse_entry
+from app.measure.front import pareto_front
 from app.render.techniques import VARIANTS
 
 STYLES: Mapping[str, tuple[str, Shape]] = {

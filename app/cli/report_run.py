@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.common import headless_renderer, is_software, messages, named_scene, scene_path
+from app.cli.common import headless_renderer, messages, named_scene, scene_path
 from app.cli.drawing import png_file, svg_file
 from app.cli.folder import TimedSteps, check_folder, csv_text, machine_facts, version
-from app.cli.log_plot import pareto_front
 from app.cli.report_page import report_page
 from app.cli.report_parts import (
     Part,
@@ -44,11 +43,12 @@ from app.measure.errors import (
     own_lobe,
     probe_errors,
 )
+from app.measure.front import pareto_front
 from app.measure.times import measure_passes
 from app.render.needs import needs_of
 from app.render.tables import table_textures
 from app.render.techniques import AUTOMATIC
-from app.render.timers import Clock
+from app.render.timers import Clock, is_software
 from app.render.truth import Lobe
 from app.scene import RenderSettings, Scene, Shot
 from app.scene_io import demo_scenes

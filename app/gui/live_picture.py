@@ -78,6 +78,11 @@ class LivePicture:
         self._touched_at = 0.0
 
     @property
+    def full_size_seconds(self) -> float:
+        """About how long a sample at full size takes."""
+        return self._full_size_seconds
+
+    @property
     def has_failed(self) -> bool:
         """Whether the present scene could not be rendered."""
         return self._failed is not None

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
+from app.panels.measurement import Measurement, measurement_section
 from app.panels.widgets import ACCENT, hint, tooltip
 
 
@@ -31,8 +33,8 @@ class Report:
     samples: tuple[int, int] = (0, 0)
 
 
-def performance_panel(report: Report) -> None:
-    """Draw the panel."""
+def performance_panel(report: Report, measurement: Measurement) -> Literal["", "measure", "stop"]:
+    """Draw the panel; return what is asked for: to measure the techniques, or to stop that."""
     hint(f"{report.gpu}\n{report.size[0]} × {report.size[1]} pixels")
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop
     if report.passes and imgui.begin_table("passes", 2, flags):
@@ -48,6 +50,7 @@ def performance_panel(report: Report) -> None:
         imgui.end_table()
     if len(report.history) > 1:
         _history(np.asarray(report.history, dtype=np.float64))
+    return measurement_section(measurement)
 
 
 def _history(milliseconds: np.ndarray) -> None:

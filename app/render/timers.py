@@ -77,3 +77,8 @@ class PassTimers:
         """Drop the queries; moderngl deletes them with their context."""
         self._queries.clear()
         self._unread.clear()
+
+
+def is_software(renderer_name: str) -> bool:
+    """Tell Mesa's software rasterisers, whose timer queries say little, by their name."""
+    return any(word in renderer_name.lower() for word in ("llvmpipe", "softpipe", "swrast"))

@@ -20,9 +20,9 @@ import matplotlib.pyplot as plt
 import moderngl
 import numpy as np
 
-from app.cli.common import is_software
 from app.context import headless_context
 from app.render.renderer import Renderer
+from app.render.timers import is_software
 from app.scene import Material, Outline, Plane, RenderSettings, Scene, Shot
 from tests.gl.cost_scenes import (
     BEHIND,

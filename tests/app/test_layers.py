@@ -31,7 +31,7 @@ WINDOW = {
     "app.gui.viewport_window", "app.gui.viewport", "app.gui.overlays", "app.gui.placement",
     "app.gui.dialogs", "app.gui.message_list", "app.gui.exports", "app.gui.reports",
     "app.gui.theme", "app.gui.live_picture", "app.gui.grips", "app.gui.outline_tool",
-    "app.gui.legend", "app.gui.comparison",
+    "app.gui.legend", "app.gui.measuring", "app.gui.comparison",
     "app.gui.lobe_window", "app.gui.lobe_point",
 }  # fmt: skip
 TOP = {"app.window", "app.cli", "app.__main__"}

@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 from app.cli.drawing import NAMESPACE, Drawing, Line, Mark, Words, png_file, svg_element, svg_file
-from app.cli.log_plot import HEIGHT, WIDTH, Point, log_plot, pareto_front
+from app.cli.log_plot import HEIGHT, WIDTH, Point, log_plot
+from app.measure.front import pareto_front
 
 
 def test_pareto_front() -> None:

@@ -41,7 +41,7 @@ from app.scene import (
     Transform,
 )
 from app.scene_io import load_scene
-from tests.gui import comparing, lobes, outlines
+from tests.gui import comparing, lobes, measuring, outlines
 from tests.gui.application import Application
 
 CTRL, SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
@@ -650,6 +650,7 @@ SCENARIOS = (
     *outlines.SCENARIOS,
     *comparing.SCENARIOS,
     *lobes.SCENARIOS,
+    *measuring.SCENARIOS,
 )
 
 

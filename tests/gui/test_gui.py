@@ -61,6 +61,8 @@ SCENARIOS = (
     "lobe_under_the_pointer",
     "pinned_lobe",
     "lobe_by_hand",
+    "measure_the_techniques",
+    "stop_measuring",
 )
 
 pytestmark = pytest.mark.skipif(
