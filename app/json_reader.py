@@ -24,9 +24,6 @@ from app.scene import SceneError, Vec2, Vec3
 LARGEST_NUMBER = 1e15
 """Beyond this the square of a number, times a scene's sizes, leaves float32."""
 
-LATER = {"texture": "textured lights"}
-"""Keys of the format that this version does not support, and what they stand for."""
-
 DECIMAL = Context(prec=60)
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459")
 
@@ -131,12 +128,6 @@ def check_fields(value: Any, place: str, known: Iterable[str], kind: str) -> Jso
     for key in value:
         if key in known:
             continue
-        if key in LATER:
-            raise PlaceError(
-                place_of(place, key),
-                f"{LATER[key]} are not supported by this version, "
-                "expected lights of constant radiance",
-            )
         guess = nearest(key, known)
         meant = f" (did you mean '{guess}'?)" if guess else ""
         raise PlaceError(

@@ -1,4 +1,4 @@
-"""Lights in scene files: their outlines, and the text or drawing that one was made from.
+"""Lights in scene files: outlines, the text or drawing that one was made from, pictures.
 
 A source stands beside its outline. The outline is what counts, so a scene still
 opens where a font or a drawing is missing; only where there is no outline is it
@@ -22,6 +22,7 @@ from app.json_reader import (
     check_fields,
     fill_names,
     place_of,
+    read_angle,
     read_any_text,
     read_bool,
     read_choice,
@@ -34,9 +35,12 @@ from app.json_reader import (
     read_vec2,
     read_vec3,
 )
+from app.json_writer import degrees
 from app.scene import (
     ANCHOR_KINDS,
+    COLOR_SPACES,
     FILL_RULES,
+    PICTURE_FITS,
     TEXT_ALIGNS,
     AnchorKind,
     AreaLight,
@@ -45,6 +49,7 @@ from app.scene import (
     CubicCurve,
     Outline,
     OutlineSource,
+    Picture,
     Plane,
     PolygonContour,
     SvgSource,
@@ -73,6 +78,7 @@ def read_lights(value: Any, place: str, base: Path) -> tuple[AreaLight, ...]:
         "radiance": read_colour,
         "two_sided": read_bool,
         "visible": read_bool,
+        "picture": lambda item, at: _picture(item, at, base),
     }
     items = read_list(value, place, "lights")
     read = [
@@ -142,6 +148,40 @@ def _svg_source(value: Any, place: str, base: Path) -> SvgSource:
     if "path" not in values:
         raise PlaceError(place, 'the key "path" is missing, expected {"path": "logo.svg"}')
     return build_part(place, "svg", SvgSource, **values)
+
+
+def _picture(value: Any, place: str, base: Path) -> Picture:
+    def file(item: Any, at: str) -> str:
+        return absolute_path(base.resolve() / read_text(item, at, "the path of a picture file"))
+
+    if isinstance(value, str):
+        return Picture(file(value, place))
+    readers: dict[str, Reader] = {
+        "file": file,
+        "color_space": lambda item, at: read_choice(item, at, COLOR_SPACES),
+        "fit": lambda item, at: read_choice(item, at, PICTURE_FITS),
+        "offset": lambda item, at: read_vec2(item, at, "[right, up]"),
+        "scale": lambda item, at: read_vec2(item, at, "[width, height]"),
+        "rotation": read_angle,
+        "mirror": _mirror,
+        "frames_per_second": read_number,
+        "start": read_number,
+    }
+    values = read_object(value, place, "a picture", readers)
+    if "file" not in values:
+        raise PlaceError(place, 'the key "file" is missing, expected {"file": "window.png"}')
+    return build_part(place, "picture", Picture, **values)
+
+
+def _mirror(value: Any, place: str) -> tuple[bool, bool]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise PlaceError(
+            place,
+            f"found {describe(value)}, "
+            "expected 2 of true and false [left and right, top and bottom]",
+        )
+    across, down = (read_bool(item, f"{place}[{i}]") for i, item in enumerate(value))
+    return across, down
 
 
 def _plane(value: Any, place: str) -> Plane:
@@ -267,6 +307,25 @@ def light_fields(light: AreaLight, base: Path | None) -> dict[str, Any]:
         "radiance": light.radiance,
         "two_sided": light.two_sided,
         "visible": light.visible,
+        **_picture_fields(light.picture, base),
+    }
+
+
+def _picture_fields(picture: Picture | None, base: Path | None) -> dict[str, Any]:
+    if picture is None:
+        return {}
+    return {
+        "picture": {
+            "file": relative_path(picture.file, base),
+            "color_space": picture.color_space,
+            "fit": picture.fit,
+            "offset": picture.offset,
+            "scale": picture.scale,
+            "rotation": degrees(picture.rotation),
+            "mirror": list(picture.mirror),
+            "frames_per_second": picture.frames_per_second,
+            "start": picture.start,
+        }
     }
 
 
@@ -294,9 +353,13 @@ def _contour_fields(contour: Contour) -> dict[str, Any]:
     return {"bezier": contour.curves, **kinds}
 
 
-def with_absolute_source(light: AreaLight) -> AreaLight:
-    """Return a light whose source has the path that a saved file gives it when read again."""
+def with_absolute_paths(light: AreaLight) -> AreaLight:
+    """Return a light whose files have the paths that a saved scene gives them when read again."""
     source = light.source
+    if light.picture is not None:
+        light = replace(
+            light, picture=replace(light.picture, file=absolute_path(light.picture.file))
+        )
     if isinstance(source, TextSource) and source.font:
         return replace(light, source=replace(source, font=absolute_path(source.font)))
     if isinstance(source, SvgSource):

@@ -26,12 +26,16 @@ CubicCurve: TypeAlias = tuple[Vec2, Vec2, Vec2, Vec2]
 TextAlign: TypeAlias = Literal["left", "center", "right"]
 AnchorKind: TypeAlias = Literal["corner", "smooth", "symmetric"]
 PixelView: TypeAlias = Literal["radiance", "cost"]
+ColorSpace: TypeAlias = Literal["auto", "srgb", "linear"]
+PictureFit: TypeAlias = Literal["stretch", "fit", "fill", "tile"]
 
 FILL_RULES: tuple[FillRule, ...] = ("evenodd", "nonzero")
 TONE_MAPS: tuple[ToneMap, ...] = ("agx", "aces", "reinhard", "none")
 ANCHOR_KINDS: tuple[AnchorKind, ...] = ("corner", "smooth", "symmetric")
 TEXT_ALIGNS: tuple[TextAlign, ...] = ("left", "center", "right")
 PIXEL_VIEWS: tuple[PixelView, ...] = ("radiance", "cost")
+COLOR_SPACES: tuple[ColorSpace, ...] = ("auto", "srgb", "linear")
+PICTURE_FITS: tuple[PictureFit, ...] = ("stretch", "fit", "fill", "tile")
 BUILT_IN_MESHES = ("plane", "sphere", "disc", "box")
 
 ALPHA_MIN = 1e-4
@@ -39,6 +43,7 @@ ALPHA_MIN = 1e-4
 
 MAX_SAMPLES = 65536
 MAX_IMAGE_SIDE = 16384
+MAX_FRAMES_PER_SECOND = 1000.0
 
 
 class SceneError(ValueError):
@@ -307,11 +312,80 @@ OutlineSource: TypeAlias = TextSource | SvgSource
 
 
 @dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture file on a light, and how it lies there; `app.pictures` reads and places it.
+
+    Seen from the emitting side, u to the right and v up, an unturned picture stands upright.
+
+    Attributes
+    ----------
+    file : str
+        Absolute path of a still or animated picture; with ``%d`` or ``%04d`` in its name, the
+        numbered frames of a sequence.
+    color_space : str
+        How the file's numbers stand for light; ``auto`` is linear for numbers in floating
+        point, sRGB for whole ones.
+    fit : str
+        Within the box around the outline: ``stretch`` to its sides, whole (``fit``), without a
+        gap (``fill``), or whole and repeated for ever (``tile``).
+    offset : (right, up)
+        Moves the picture, in widths and heights of that box.
+    scale : (width, height)
+        Sizes of the picture relative to what ``fit`` gives, above 0.
+    rotation : float
+        Counter-clockwise about the picture's middle [rad].
+    mirror : (left and right, top and bottom)
+        Whether they change places, before the rotation.
+    frames_per_second : float
+        Of an animation; 0 is what the file says, 25 where it says nothing.
+    start : float
+        The moment of the animation [s] that is shown at time 0.
+    """
+
+    file: str
+    color_space: ColorSpace = "auto"
+    fit: PictureFit = "stretch"
+    offset: Vec2 = (0.0, 0.0)
+    scale: Vec2 = (1.0, 1.0)
+    rotation: float = 0.0
+    mirror: tuple[bool, bool] = (False, False)
+    frames_per_second: float = 0.0
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.file.strip() or "\0" in self.file:
+            raise SceneError(f"picture: file is {self.file!r}, expected the path of a file")
+        if self.color_space not in COLOR_SPACES:
+            raise SceneError(
+                f"picture: color_space is '{self.color_space}', "
+                f"expected one of {', '.join(COLOR_SPACES)}"
+            )
+        if self.fit not in PICTURE_FITS:
+            raise SceneError(
+                f"picture: fit is '{self.fit}', expected one of {', '.join(PICTURE_FITS)}"
+            )
+        _finite("picture", "offset", self.offset, 2)
+        _finite("picture", "scale", self.scale, 2)
+        if not all(x > 0.0 for x in self.scale):
+            raise SceneError(f"picture: scale is {self.scale}, expected numbers above 0")
+        if len(self.mirror) != 2:
+            raise SceneError(f"picture: mirror has {len(self.mirror)} values, expected 2")
+        for field in ("rotation", "frames_per_second", "start"):
+            _finite("picture", field, (getattr(self, field),), 1)
+        if not 0.0 <= self.frames_per_second <= MAX_FRAMES_PER_SECOND:
+            raise SceneError(
+                f"picture: frames_per_second is {self.frames_per_second:g}, "
+                f"expected between 0 and {MAX_FRAMES_PER_SECOND:g}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
 class AreaLight:
-    """A planar light that emits constant radiance towards u x v, or to both sides.
+    """A planar light that emits radiance towards u x v, or to both sides.
 
     ``visible`` says whether the camera sees the light itself. ``source`` is what the
-    outline was made from, if it was; editing the outline itself forgets it.
+    outline was made from, if it was; editing the outline itself forgets it. A ``picture`` on it
+    multiplies the radiance; where it is transparent there is no light.
     """
 
     name: str
@@ -321,6 +395,7 @@ class AreaLight:
     two_sided: bool = False
     visible: bool = True
     source: OutlineSource | None = None
+    picture: Picture | None = None
 
     def __post_init__(self) -> None:
         _non_negative(f"light '{self.name}'", "radiance", self.radiance)
@@ -399,6 +474,8 @@ class RenderSettings:
     ``positions`` is how many places in a pixel the samples take in turn, 0 for one of its own
     each: pictures of different techniques with unequal numbers of samples differ by nothing but
     the technique if they share it, and their samples are multiples of it.
+
+    ``time`` [s] is the moment of animated pictures that is shown.
     """
 
     technique: str = "auto"
@@ -406,8 +483,10 @@ class RenderSettings:
     view: PixelView = "radiance"
     positions: int = 0
     cull: float = 0.0
+    time: float = 0.0
 
     def __post_init__(self) -> None:
+        _finite("settings", "time", (self.time,), 1)
         if self.view not in PIXEL_VIEWS:
             raise SceneError(f"view is '{self.view}', expected one of {', '.join(PIXEL_VIEWS)}")
         if not 1 <= self.samples <= MAX_SAMPLES:

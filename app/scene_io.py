@@ -39,7 +39,7 @@ from app.json_reader import (
     read_vec3,
 )
 from app.json_writer import degrees, layout
-from app.light_io import light_fields, read_lights, with_absolute_source
+from app.light_io import light_fields, read_lights, with_absolute_paths
 from app.meshes import check_mesh_path
 from app.scene import (
     BUILT_IN_MESHES,
@@ -70,8 +70,8 @@ def load_scene(path: Path | str) -> Scene:
     """Read a scene file.
 
     Paths are relative to the file and become absolute. Those of meshes must
-    exist; the meshes themselves are read when they are drawn. Fonts and drawings
-    are read only for lights that lack the outline made from them.
+    exist; the meshes themselves are read when they are drawn, and pictures too.
+    Fonts and drawings are read only for lights that lack the outline made from them.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def save_scene(scene: Scene, path: Path | str) -> None:
     meant = replace(
         scene,
         objects=tuple(_with_absolute_mesh(item) for item in scene.objects),
-        lights=tuple(with_absolute_source(light) for light in scene.lights),
+        lights=tuple(with_absolute_paths(light) for light in scene.lights),
     )
     try:
         if scene_from_json(text, path.parent, str(path)) != meant:

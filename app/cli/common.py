@@ -25,6 +25,7 @@ from rich.progress import (
 
 from app.errors import InputError, nearest
 from app.meshes import load_mesh
+from app.pictures import load_frame
 from app.render.techniques import technique_lines
 from app.scene import MAX_IMAGE_SIDE, MAX_SAMPLES, Scene
 from app.scene_io import demo_scenes, load_scene
@@ -164,11 +165,12 @@ def scene_path(name: str) -> Path:
     )
 
 
-def named_scene(name: str) -> Scene:
-    """Load the scene that a SCENE argument means, and its meshes.
+def named_scene(name: str, time: float = 0.0) -> Scene:
+    """Load the scene that a SCENE argument means, its meshes and pictures.
 
-    Meshes are cached, so reading them here costs nothing later, and a damaged
-    one is told with its place before anything is drawn.
+    Both are cached, so reading them here costs nothing later, and a damaged
+    one is told with its place before anything is drawn. ``time`` [s] is the
+    moment of animated pictures. What was changed in a picture goes to stderr.
     """
     path = scene_path(name)
     scene = load_scene(path)
@@ -177,6 +179,15 @@ def named_scene(name: str) -> Scene:
             load_mesh(item.mesh)
         except InputError as error:
             raise InputError(f"{path}: objects[{index}].mesh: {error}") from None
+    told: set[str] = set()
+    for index, light in enumerate(scene.lights):
+        if light.picture is not None:
+            try:
+                told |= set(load_frame(light.picture, time).reports)
+            except InputError as error:
+                raise InputError(f"{path}: lights[{index}].picture: {error}") from None
+    for report in sorted(told):
+        messages().print(report, markup=False)
     return scene
 
 

@@ -44,6 +44,10 @@ def shot(
             help=f"What pixels show: {' or '.join(PIXEL_VIEWS)}.",
         ),
     ] = "radiance",
+    time: Annotated[
+        float,
+        typer.Option("--time", metavar="SECONDS", help="Moment that animated pictures show."),
+    ] = 0.0,
 ) -> None:
     """Render a scene to a picture, without a window.
 
@@ -65,8 +69,8 @@ def shot(
     check_image_path(output)
     if view not in PIXEL_VIEWS:
         raise InputError(f"--view is '{view}', {expected_one_of(view, PIXEL_VIEWS)}")
-    settings = RenderSettings(technique, samples, view, cull=cull)
-    wanted = Shot(named_scene(scene), settings, width, height)
+    settings = RenderSettings(technique, samples, view, cull=cull, time=time)
+    wanted = Shot(named_scene(scene, time), settings, width, height)
     with headless_renderer() as (ctx, renderer):
         with Steps("rendering", samples) as steps:
             while (done := renderer.accumulate(wanted, samples)) < samples:

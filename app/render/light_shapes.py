@@ -37,9 +37,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.caching import ByteCache
 from app.curves import bounds, evaluate, extrema, part
 from app.outline import boundary, resolve, triangulate
-from app.render.caching import ByteCache
 from app.render.camera import CameraFrame
 from app.render.pack import CACHED_BYTES, is_curved, plane_basis
 from app.scene import AreaLight, Outline

@@ -18,10 +18,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from app.caching import ByteCache
 from app.curves import bounds, derivative, evaluate, is_straight, line_as_cubic
 from app.errors import InputError
 from app.outline import boundary, resolve
-from app.render.caching import ByteCache
 from app.render.contour_tree import TreeNodes, contour_tree, curve_list
 from app.scene import AreaLight, BezierContour, Material, Plane
 

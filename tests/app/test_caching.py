@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.render.caching import ByteCache
+from app.caching import ByteCache
 
 
 def test_bytes_are_bounded_and_the_oldest_goes_first() -> None:

@@ -282,8 +282,37 @@ CASES: dict[str, Case] = {
         outline({"polygon": [[0, 0], [1, 0], [1, 1]], "kinds": ["corner"]}),
         "lights[0].outline.contours[0].kinds", "for a polygon",
     ),
+    # Pictures
+    "picture missing": bad_scene(
+        scene(lights=[{"picture": "a.png"}]), "lights[0].picture: ", "a.png", "no such file"
+    ),
+    "picture of a light is a folder": bad_scene(
+        scene(lights=[{"picture": "."}]), "lights[0].picture: ", "this is a folder"
+    ),
+    "picture cut off": Case(
+        {"scene.json": scene(lights=[{"picture": "a.png"}]), "a.png": png_bytes(PIXELS)[:48]},
+        ("lights[0].picture: ", "a.png", "damaged"),
+    ),
+    "frame missing": bad_scene(
+        scene(lights=[{"picture": "a%03d.png"}]), "lights[0].picture: ", "such as a001.png"
+    ),
+    "picture without a file": bad_scene(
+        scene(lights=[{"picture": {}}]), "lights[0].picture", '"file" is missing'
+    ),
+    "picture of another fit": bad_scene(
+        scene(lights=[{"picture": {"file": "a.png", "fit": "cover"}}]),
+        "lights[0].picture.fit", "stretch, fit, fill, tile",
+    ),
+    "picture without a size": bad_scene(
+        scene(lights=[{"picture": {"file": "a.png", "scale": [1, 0]}}]),
+        "lights[0].picture.scale", "above 0",
+    ),
+    "picture half mirrored": bad_scene(
+        scene(lights=[{"picture": {"file": "a.png", "mirror": [True]}}]),
+        "lights[0].picture.mirror", "2 of true and false",
+    ),
     "texture": bad_scene(
-        scene(lights=[{"texture": {"image": "a.png"}}]), "lights[0].texture", "not supported"
+        scene(lights=[{"texture": "a.png"}]), "lights[0]", '"texture"', "picture"
     ),
     # Sources
     "text without a string": bad_scene(

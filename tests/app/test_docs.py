@@ -102,7 +102,7 @@ def test_json_loads(page: Path, text: str) -> None:
 
 def test_documented_defaults_are_the_real_ones() -> None:
     """Every row of docs/scene-file.md whose default is a JSON value."""
-    lights = [{}, {"text": "A"}, {"svg": "a.svg", "outline": {}}]
+    lights = [{}, {"text": "A"}, {"svg": "a.svg", "outline": {}}, {"picture": "a.png"}]
     parts = {"camera": {}, "materials": {"m": {}}, "objects": [{}], "lights": lights, "display": {}}
     text = json.dumps({"format": "ltc-scene/1", **parts})
     written = json.loads(scene_to_json(scene_from_json(text, None, "text"), None))

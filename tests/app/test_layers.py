@@ -25,6 +25,7 @@ PURE = {
     "app.loops", "app.text", "app.text_runs", "app.svg", "app.svg_paths", "app.svg_tree",
     "app.json_reader", "app.json_writer", "app.light_io", "app.plan_rows",
     "app.colour_maps", "app.lobe_picture", "app.lobe_figure",
+    "app.caching", "app.pictures", "app.picture_files",
 }  # fmt: skip
 WINDOW = {
     "app.window", "app.gui.layout", "app.gui.menus", "app.gui.keyboard", "app.gui.panel_windows",

@@ -20,7 +20,9 @@ from app.json_reader import LARGEST_NUMBER
 from app.json_writer import LINE_LENGTH
 from app.scene import (
     ANCHOR_KINDS,
+    COLOR_SPACES,
     FILL_RULES,
+    PICTURE_FITS,
     TEXT_ALIGNS,
     TONE_MAPS,
     AreaLight,
@@ -29,6 +31,7 @@ from app.scene import (
     Display,
     Material,
     Outline,
+    Picture,
     Plane,
     PolygonContour,
     Scene,
@@ -101,6 +104,17 @@ def test_everything_but_the_format_has_a_default() -> None:
     assert [item.material for item in scene.objects] == ["default", "default"]
     assert [light.name for light in scene.lights] == ["light 1", "light 2"]
     assert scene.lights[1] == AreaLight("light 2", Outline((SQUARE,)))
+
+
+def test_a_picture_by_its_file_alone() -> None:
+    scene = scene_from_json(document(lights=[{"picture": "p/a.png"}]), Path("/b/c"), "test")
+    assert scene.lights[0].picture == Picture("/b/c/p/a.png")
+    written = json.loads(scene_to_json(scene, Path("/b")))["lights"][0]["picture"]
+    assert written == {
+        "file": "c/p/a.png", "color_space": "auto", "fit": "stretch", "offset": [0, 0],
+        "scale": [1, 1], "rotation": 0, "mirror": [False, False], "frames_per_second": 0,
+        "start": 0,
+    }  # fmt: skip
 
 
 def test_missing_names_step_aside() -> None:
@@ -193,6 +207,18 @@ sources = valid(
     spacing=numbers,
     line_height=numbers,
 ) | valid(SvgSource, path=st.sampled_from(("/a.svg", "/b/c d.svg")), size=st.floats(1e-9, 1e9))
+pictures = valid(
+    Picture,
+    file=st.sampled_from(("/a.png", "/scenes/ü b_%04d.exr", "/meshes/scenes/c.gif")),
+    color_space=st.sampled_from(COLOR_SPACES),
+    fit=st.sampled_from(PICTURE_FITS),
+    offset=places,
+    scale=st.tuples(st.floats(1e-9, 1e9), st.floats(1e-9, 1e9)),
+    rotation=st.floats(-1e6, 1e6),
+    mirror=st.tuples(st.booleans(), st.booleans()),
+    frames_per_second=st.floats(0.0, 1000.0),
+    start=numbers,
+)
 lights = valid(
     AreaLight,
     name=names,
@@ -202,6 +228,7 @@ lights = valid(
     two_sided=st.booleans(),
     visible=st.booleans(),
     source=st.none() | sources,
+    picture=st.none() | pictures,
 )
 materials = valid(
     Material,
