@@ -29,6 +29,7 @@ from app.cli.lobe import lobe
 from app.cli.probe import probe
 from app.cli.report import report
 from app.cli.shot import shot
+from app.cli.stability import stability
 from app.errors import InputError, nearest, os_reason
 from app.scene import SceneError
 from app.scene_io import load_scene
@@ -140,6 +141,7 @@ app.command()(shot)
 app.command()(probe)
 app.command()(bench)
 app.command()(report)
+app.command()(stability)
 app.command()(compare)
 app.command()(lobe)
 app.command()(explain)

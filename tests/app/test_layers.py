@@ -97,6 +97,8 @@ def forbidden(name: str) -> set[str]:
             | WINDOW
             | GUI
         )
+    if name.startswith("app.stability"):
+        return {"app.panels", "app.editor", "app.edits", "app.cli"} | WINDOW | GUI | GL
     if name.startswith("app.panels"):
         return {"app.render", "app.context", "glfw"} | WINDOW | GL
     if name == "app.context":
@@ -107,7 +109,7 @@ def forbidden(name: str) -> set[str]:
 
 
 def test_every_module_has_its_layer() -> None:
-    packages = ("ltc", "app.render", "app.measure", "app.panels", "app.cli")
+    packages = ("ltc", "app.render", "app.measure", "app.panels", "app.stability", "app.cli")
     known = PURE | WINDOW | TOP | {"app", "app.context", "app.gui"}
     homeless = {name for name in MODULES if name not in known and not name.startswith(packages)}
     assert not homeless
