@@ -32,6 +32,7 @@ from app.gui.dialogs import FileDialogs
 from app.gui.documents import Documents
 from app.gui.exports import Exports
 from app.gui.imports import Imports
+from app.gui.inspector import Inspector
 from app.gui.keyboard import act_on_keys
 from app.gui.layout import TITLE, docking, runner_params
 from app.gui.lobe_window import LobeWindow
@@ -56,7 +57,7 @@ from app.scene import Scene
 class Window:
     """The application: an editor, a renderer, and what joins them on the screen.
 
-    Renderer, viewport, exports and lobe need OpenGL; they are there once it is.
+    Renderer, viewport, exports, lobe and inspector need OpenGL; they are there once it is.
 
     Parameters
     ----------
@@ -70,6 +71,7 @@ class Window:
     viewport: Viewport
     exports: Exports
     lobe: LobeWindow
+    inspector: Inspector
 
     def __init__(self, scene: Scene, path: Path | None = None) -> None:
         self.editor = Editor(scene, path)
@@ -121,10 +123,11 @@ class Window:
             "Lobe": self._lobe_window,
             "Material": lambda: self._panels.material(self.viewport.settings),
             "Object": self._panels.object,
+            "Inspector": lambda: self.inspector.draw(),
             "Display": self._display_window,
             "Camera": self._panels.camera,
             "Performance": self._performance_window,
-            "Compare": lambda: self._panels.compare(self.viewport.comparison),
+            "Compare": self._compare_window,
             "Plan": self._plan_window,
         }
         return {name: self._guarded(draw) for name, draw in windows.items()}
@@ -173,6 +176,7 @@ class Window:
         self.renderer = Renderer(moderngl.create_context())
         self.viewport = Viewport(self.renderer, self.messages)
         self.lobe = LobeWindow(self.renderer.ctx)
+        self.inspector = Inspector(self.viewport, self.renderer)
         self.exports = Exports(
             self.editor, self.viewport, self.renderer, self.messages, self.dialogs
         )
@@ -184,7 +188,8 @@ class Window:
     def _stop(self) -> None:
         self.exports.release()
         self.measuring.stop()
-        self.viewport.comparison.release()
+        self.inspector.release()
+        self.viewport.comparison.close()
         self.lobe.release()
         self.renderer.release()
 
@@ -194,6 +199,10 @@ class Window:
         """What is not inside a docked window: keys, dialogs, messages, the end of drags."""
         act_on_keys(self._actions)
         self.lobe.point_at(self.viewport.hovered, self.editor)
+        asked, self.viewport.asked_pin = self.viewport.asked_pin, None
+        if asked is not None:
+            self.lobe.pin_at(asked, self.editor)
+        self.inspector.step()
         self.viewport.pin = self.lobe.pin(self.editor, self.viewport.camera_of(self.editor.scene))
         self.dialogs.poll()
         dropped, self.dropped = self.dropped, []
@@ -208,8 +217,9 @@ class Window:
         self._update_title()
         with self.messages.guard():
             self.measuring.step(self.renderer.ctx)
-        settled = self.viewport.is_idle and self.lobe.is_settled and not self.measuring.is_busy
-        if not settled or self.exports.is_busy:
+        works = (self.measuring, self.inspector, self.exports)
+        is_busy = any(work.is_busy for work in works)
+        if is_busy or not (self.viewport.is_idle and self.lobe.is_settled):
             hello_imgui.request_refresh()
 
     def _ask_about_unsaved(self) -> None:
@@ -250,6 +260,9 @@ class Window:
 
     def _display_window(self) -> None:
         self.viewport.settings = self._panels.display(self.viewport.settings)
+
+    def _compare_window(self) -> None:
+        self._panels.compare(self.viewport.comparison, self.viewport.picture)
 
     def _lobe_window(self) -> None:
         self.lobe.draw(self.editor, self.viewport.camera_of(self.editor.scene))

@@ -11,22 +11,24 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.gui import theme
+from app.gui.breakdowns import BreakdownWork
 from app.gui.legend import draw_legend
 from app.gui.live_picture import LivePicture, Reporter, draw_texture
 from app.gui.overlays import View
+from app.gui.summaries import Source, Summary, number_rows
 from app.panels import compare as panel
 from app.panels.compare import Comparing
 from app.render.comparison import Pictures, shared_samples
-from app.render.difference import DifferenceView, Measure, Numbers, Scale, robust_high
+from app.render.difference import DifferenceView, Scale
 from app.render.difference_pass import DifferencePass
-from app.render.flip import FloatArray
+from app.render.gathering import random_places
 from app.render.renderer import Renderer
 from app.render.techniques import find_technique, technique_of
 from app.scene import Camera, RenderSettings, Scene, Shot
@@ -43,44 +45,6 @@ VIEWS: dict[panel.Shown, DifferenceView] = {
     "FLIP": "flip",
 }
 """What is shown in false colours."""
-
-
-@dataclass(frozen=True, eq=False)
-class Source:
-    """What numbers were computed of; the shots are compared by identity."""
-
-    shots: tuple[Shot, Shot]
-    samples: tuple[int, int]
-    measure: Measure
-    flips: bool
-
-    def covers(self, other: Source) -> bool:
-        """Tell whether nothing else would be computed of ``other``."""
-        return (
-            all(a is b for a, b in zip(self.shots, other.shots, strict=True))
-            and (self.samples, self.measure) == (other.samples, other.measure)
-            and (self.flips or not other.flips)
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Summary:
-    """What was computed of two pictures."""
-
-    source: Source
-    numbers: Numbers
-    highs: dict[DifferenceView, float]
-    flip: FloatArray | None
-
-    @classmethod
-    def of(cls, source: Source, pictures: Pictures) -> Summary:
-        numbers = pictures.numbers(source.measure)
-        views: tuple[DifferenceView, ...] = ("signed", "absolute", "relative", "flip")
-        highs = {
-            view: robust_high(view, pictures.a, pictures.b, source.measure, numbers.floor)
-            for view in views
-        }
-        return cls(source, numbers, highs, pictures.flip() if source.flips else None)
 
 
 class _Side:
@@ -116,6 +80,8 @@ class Comparison:
         What the panel edits.
     summary : Summary or None
         The last numbers.
+    parts : BreakdownWork
+        Of A's error at random pixels.
     """
 
     def __init__(self, renderer: Renderer, reporter: Reporter) -> None:
@@ -123,6 +89,7 @@ class Comparison:
         self.summary: Summary | None = None
         self.names = ("", "")
         self.sampled = False
+        self.parts = BreakdownWork(renderer)
         self._a_renderer = renderer
         self._reporter = reporter
         self._a: LivePicture | None = None
@@ -151,6 +118,8 @@ class Comparison:
     @property
     def is_idle(self) -> bool:
         """Whether nothing is left to do: all samples there, and numbers of them."""
+        if self.parts.is_busy:
+            return False
         if self._side is None:
             return not self.is_on
         if not self._side.picture.is_settled(self._pixels) or self._pending is not None:
@@ -206,6 +175,11 @@ class Comparison:
         """Show B, or A again."""
         self.form = self.form.flipped()
 
+    def close(self) -> None:
+        """End what runs aside, and release everything."""
+        self.parts.cancel()
+        self.release()
+
     def release(self) -> None:
         """Give up everything that costs memory or time."""
         side, self._side = self._side, None
@@ -227,6 +201,7 @@ class Comparison:
 
         ``settings`` are those that `settings` returned; A has been rendered by its own.
         """
+        self.parts.step(a)
         if len(settings) < 2:
             if self._side is not None:
                 self.release()
@@ -396,36 +371,21 @@ class Comparison:
         """Return what the panel shows, None while nothing is compared."""
         if not self.is_on or self._side is None or self._a is None:
             return None
-        rows: tuple[panel.NumberRow, ...] = ()
-        if self.summary is not None:
-            rows = tuple(_rows(self.summary))
         return panel.Comparison(
             self.names,
             (self._a.samples, self._side.picture.samples),
-            rows,
+            number_rows(self.summary) if self.summary is not None else (),
             self.is_summed,
             self.sampled,
             self.scale.high,
             "Computing …" if self._pending is not None else "",
         )
 
-
-SHORT = {"95 % below": "p95", "99 % below": "p99", "largest": "max", "A brighter by": "bias"}
-"""Names of numbers that a narrow panel has room for."""
-
-
-def _rows(summary: Summary) -> list[panel.NumberRow]:
-    numbers = summary.numbers
-    rows = []
-    for name, value, *shares in numbers.rows():
-        texts = ("" if share is None else f"{100.0 * share:.3g} %" for share in shares)
-        rows.append(panel.NumberRow(SHORT.get(name, name), f"{value:.3g}", *texts))
-    rows.append(panel.NumberRow("mean of B", f"{numbers.mean_b:.3g}"))
-    if summary.flip is not None:
-        rows.append(panel.NumberRow("mean FLIP", f"{float(summary.flip.mean()):.3g}"))
-    if numbers.bad:
-        rows.append(panel.NumberRow("not finite", f"{numbers.bad} pixels"))
-    return rows
+    def ask_parts(self, a: LivePicture) -> None:
+        """Find out whose A's error is at random pixels, or give that up."""
+        if a.shot is not None:
+            places = random_places((a.shot.width, a.shot.height))
+            self.parts.start(a, places, self.form.points)
 
 
 def _is_milestone(picture: LivePicture) -> bool:

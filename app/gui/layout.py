@@ -22,6 +22,7 @@ _SPACES = {
     "Lobe": "Right",
     "Material": "RightLow",
     "Object": "RightLow",
+    "Inspector": "RightLow",
     "Plan": "Right",
 }
 """The docked windows and their places; those that share one are tabs."""

@@ -97,6 +97,13 @@ class LobeWindow:
         elif self._point is not None:
             self.state = replace(self.state, mode="pinned")
 
+    def pin_at(self, hit: Hit, editor: Editor) -> None:
+        """Pin the point that was hit, unless it is a light's."""
+        point = SurfacePoint.of(hit, editor.scene)
+        if point is not None:
+            self._hit, self._point = hit, point
+            self.state = replace(self.state, mode="pinned")
+
     def point_at(self, hit: Hit | None, editor: Editor) -> None:
         """Take note of what is under the pointer."""
         if hit is None or hit is self._hit or self.state.mode != "pointer":

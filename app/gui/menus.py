@@ -71,7 +71,7 @@ def view_menu(
     _item(actions, "overlays", "Outlines and handles", checked=overlays_shown)
     _item(actions, "compare", "Compare with another technique", checked=compares)
     _item(actions, "flip", "Flip to the other technique and back")
-    _item(actions, "pin", "Pin the lobe's point", checked=is_pinned)
+    _item(actions, "pin", "Pin the point", checked=is_pinned)
     imgui.separator()
     for window in docking.dockable_windows:
         if window.label != "Viewport" and imgui.menu_item_simple(

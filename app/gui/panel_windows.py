@@ -14,6 +14,8 @@ from app.editor import Editor
 from app.gui.beginning import first_material
 from app.gui.comparison import Comparison
 from app.gui.imports import Imports
+from app.gui.live_picture import LivePicture
+from app.gui.summaries import view_parts
 from app.panels.camera import camera_panel
 from app.panels.compare import compare_panel
 from app.panels.display import display_panel
@@ -141,10 +143,14 @@ class PanelWindows:
         self._stage(replace(scene, display=display))
         return settings
 
-    def compare(self, comparison: Comparison) -> None:
+    def compare(self, comparison: Comparison, picture: LivePicture) -> None:
         """Draw the panel of what the picture is compared with."""
         names = (*MEASURES, AUTOMATIC, *(name for name in TECHNIQUES if name not in MEASURES))
-        comparison.form = compare_panel(comparison.form, names, comparison.report())
+        comparison.form, asked = compare_panel(
+            comparison.form, names, comparison.report(), view_parts(comparison.parts, picture)
+        )
+        if asked:
+            comparison.ask_parts(picture)
 
     def camera(self) -> None:
         """Draw the panel of the view, which is no step of the history."""

@@ -57,8 +57,9 @@ class GizmoDrag:
 class Viewport:
     """Draws the picture and turns what is done to it into edits.
 
-    ``hovered`` is what was under the pointer last; ``pin`` a point to mark, with its normal
-    and tangent.
+    ``hovered`` is what was under the pointer last, ``pointer`` where that was, 0 to 1 from the
+    picture's upper left; ``pin`` a point to mark, with its normal and tangent, ``asked_pin`` one
+    that Ctrl+click asks for.
 
     Parameters
     ----------
@@ -88,7 +89,9 @@ class Viewport:
         self._is_asking = False
         self._occlusion_of: tuple[Shot | None, int, tuple[lights.Vertex, ...]] | None = None
         self.hovered: Hit | None = None
+        self.pointer: tuple[float, float] | None = None
         self.pin: tuple[Vec3, Vec3, Vec3] | None = None
+        self.asked_pin: Hit | None = None
         self._hovered_light: int | None = None
         self._asked: Hit | None = None
 
@@ -202,7 +205,10 @@ class Viewport:
             editor.look(control.dolly(editor.scene.camera, io.mouse_wheel))
         if imgui.is_item_deactivated() and self._moved <= io.mouse_drag_threshold:
             if imgui.is_mouse_released(imgui.MouseButton_.left):
-                self._select(editor, io.mouse_pos.x, io.mouse_pos.y)
+                if io.key_ctrl:
+                    self.asked_pin = self._hit(io.mouse_pos.x, io.mouse_pos.y)
+                else:
+                    self._select(editor, io.mouse_pos.x, io.mouse_pos.y)
             elif imgui.is_mouse_released(imgui.MouseButton_.right):
                 self._ask(editor, io.mouse_pos.x, io.mouse_pos.y)
         self._place_menu(editor)
@@ -291,7 +297,9 @@ class Viewport:
             hit = self._hit(io.mouse_pos.x, io.mouse_pos.y)
             is_light = hit is not None and hit.kind == "light" and hit.index < len(scene.lights)
             self._hovered_light = hit.index if hit is not None and is_light else None
-            self.hovered = hit
+            self.hovered, view = hit, self.view
+            x, y = io.mouse_pos.x - view.x, io.mouse_pos.y - view.y
+            self.pointer = x / view.width, y / view.height
 
     # --- gizmo ---------------------------------------------------------------------
 

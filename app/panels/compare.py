@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias, get_args
 from imgui_bundle import imgui
 
 from app.gui.shortcuts import key_of
+from app.panels.parts import Parts, parts_table
 from app.panels.widgets import button, checkbox, choice, heading, hint, label, slider, tooltip
 
 Shown: TypeAlias = Literal["off", "A", "B", "split", "signed", "absolute", "relative", "FLIP"]
@@ -17,6 +18,7 @@ Measured: TypeAlias = Literal["luminance", "largest channel"]
 Colours: TypeAlias = Literal["magma", "viridis", "cividis"]
 
 ESTIMATES = (16, 64, 256, 1024, 4096, 16384)
+POINTS = (16, 64, 256, 1024)
 LEAST_HIGH, MOST_HIGH = 1e-6, 1e3
 
 _SHOW_TIP = (
@@ -45,6 +47,8 @@ class Comparing:
         Its end where it does not, positive.
     divider : float
         Where the line of the split view is, 0 left to 1 right.
+    points : int
+        Random pixels at which A's error is broken down.
     """
 
     show: Shown = "off"
@@ -55,6 +59,7 @@ class Comparing:
     automatic: bool = True
     high: float = 0.1
     divider: float = 0.5
+    points: int = 64
 
     @property
     def is_on(self) -> bool:
@@ -109,12 +114,24 @@ class Comparison:
 
 
 def compare_panel(
-    value: Comparing, techniques: Sequence[str], found: Comparison | None
-) -> Comparing:
-    """Draw the panel and return the settings as edited.
+    value: Comparing, techniques: Sequence[str], found: Comparison | None, parts: Parts
+) -> tuple[Comparing, bool]:
+    """Draw the panel; return the settings as edited, and whether ``parts`` were asked for.
 
     ``techniques`` are the names to choose from; ``found`` is None while nothing is compared.
     """
+    value = _choices(value, techniques, found)
+    if found is not None:
+        _numbers(found)
+    asked = parts_table(parts, "view parts", f"Find at {value.points} points")
+    if not parts.progress:
+        tip = "How many random pixels to look at; each takes a fraction of a second"
+        value = replace(value, points=_count("Points", value.points, POINTS, tip))
+    return value, asked
+
+
+def _choices(value: Comparing, techniques: Sequence[str], found: Comparison | None) -> Comparing:
+    """Draw what can be chosen."""
     show = choice("Show", value.show, SHOWN, _SHOW_TIP)
     value = replace(value, show=show)
     tip = "The technique that A, the Display panel's, is measured by"
@@ -126,20 +143,19 @@ def compare_panel(
         )
         return value
     if found.sampled:
-        value = replace(value, estimates=_estimates(value.estimates))
+        tip = "Least samples per pixel of a technique that is a random estimate"
+        value = replace(value, estimates=_count("Estimates", value.estimates, ESTIMATES, tip))
     tip = "What of a pixel is compared: its luminance, or the channel that differs most"
     value = replace(value, measure=choice("Of", value.measure, get_args(Measured), tip))
     if value.show in ("signed", "absolute", "relative"):
         value = _range(value, found.high)
-    _numbers(found)
     return value
 
 
-def _estimates(value: int) -> int:
-    tip = "Least samples per pixel of a technique that is a random estimate"
-    if imgui.begin_combo(label("Estimates", tip), f"{value} per pixel"):
-        for count in ESTIMATES:
-            if imgui.selectable(f"{count} per pixel", count == value)[0]:
+def _count(name: str, value: int, counts: Sequence[int], tip: str) -> int:
+    if imgui.begin_combo(label(name, tip), str(value)):
+        for count in counts:
+            if imgui.selectable(str(count), count == value)[0]:
                 value = count
         imgui.end_combo()
     tooltip(tip)

@@ -33,6 +33,7 @@ WINDOW = {
     "app.gui.dialogs", "app.gui.message_list", "app.gui.exports", "app.gui.reports",
     "app.gui.theme", "app.gui.live_picture", "app.gui.grips", "app.gui.outline_tool",
     "app.gui.legend", "app.gui.measuring", "app.gui.comparison",
+    "app.gui.breakdowns", "app.gui.summaries", "app.gui.inspector",
     "app.gui.lobe_window", "app.gui.lobe_point",
 }  # fmt: skip
 TOP = {"app.window", "app.cli", "app.__main__"}

@@ -16,6 +16,8 @@ from app.render.difference import Scale, colours_of, numbers, values_of
 from app.render.flip import flip
 from tests.gui.application import Application
 
+CTRL = imgui.Key.mod_ctrl
+
 
 @contextmanager
 def comparing(app: Application, **changes: object) -> Iterator[None]:
@@ -222,10 +224,125 @@ def comparing_costs_nothing_at_rest(app: Application, out: Path) -> None:
         assert app.window.viewport.picture.samples[0] == comparison.picture.samples[0]
 
 
+def move_to(app: Application, x: float, y: float) -> None:
+    def action(ctx) -> None:
+        ctx.mouse_move_to_pos(imgui.ImVec2(x - 6.0, y))
+        ctx.yield_(2)
+        ctx.mouse_move_to_pos(imgui.ImVec2(x, y))
+        ctx.yield_(2)
+
+    app.act(action)
+    app.frame()
+
+
+def inspect_a_pixel(app: Application, out: Path) -> None:
+    """The panel tells what is under the pointer, keeps it for copying, and follows a pin."""
+    inspector, viewport = app.window.inspector, app.window.viewport
+    with comparing(app, show="split"):
+        app.act(lambda ctx: ctx.window_focus("//Inspector"))
+        x, y = app.on_screen((0.3, 0.0, 1.0))
+        move_to(app, x, y)
+        app.settle()
+        numbers = inspector.numbers
+        assert numbers is not None
+        assert numbers.hit is not None
+        assert (numbers.hit.kind, numbers.hit.index) == ("object", 0)
+        column, row = (int(at) for at in numbers.key.place)
+        assert (column, row) == (int(x - viewport.view.x), int(y - viewport.view.y))
+        a, b = both(app)
+        assert numbers.radiance == tuple(tuple(p[row, column].tolist()) for p in (a, b))
+        assert numbers.radiance[0] != numbers.radiance[1]
+        assert min(numbers.evaluations) > 0
+        # On the way to the button the pointer leaves the picture: the numbers stay.
+        with copying() as copied:
+            app.act(lambda ctx: ctx.item_click("//Inspector/###copy pixel"))
+        lines = [line.split("\t") for line in copied[0].splitlines()]
+        assert lines[0] == ["Object 'floor', material 'floor'"]
+        table = {line[0]: line[1:] for line in lines}
+        assert table["A ltc"][0] == f"{a[row, column, 0]:.6g}"
+        assert table["B ggx:4"][2] == f"{b[row, column, 2]:.6g}"
+        assert table["α x, y"] == ["0.09, 0.09"]
+        eye = np.array(app.scene.camera.eye)
+        away = eye - numbers.hit.position_ws
+        theta = np.degrees(np.arccos(away[1] / np.linalg.norm(away)))
+        assert abs(float(table["θ of the view"][0].rstrip("°")) - theta) < 0.01
+        assert table["normal"] == ["0, 1, 0"]
+
+        # A light has its radiance and no parts of an error.
+        at = app.on_screen((-0.4, 1.1, -1.0))
+        move_to(app, at[0] + 25.0, at[1] + 20.0)
+        app.settle()
+        assert inspector.numbers is not None
+        assert inspector.numbers.hit is not None
+        assert inspector.numbers.hit.kind == "light"
+        assert np.allclose(inspector.numbers.radiance[0], app.scene.lights[0].radiance)
+
+        # Ctrl+click pins the point: the pixel goes along with it.
+        def pin(ctx) -> None:
+            ctx.mouse_move_to_pos(imgui.ImVec2(x, y))
+            ctx.key_down(CTRL)
+            ctx.mouse_click(0)
+            ctx.key_up(CTRL)
+
+        selection = app.window.editor.selection
+        app.act(pin)
+        app.settle()
+        assert app.window.lobe.is_pinned
+        assert app.window.editor.selection == selection
+        camera = app.scene.camera
+        app.window.editor.look(replace(camera, eye=(0.4, 1.3, 4.4)))
+        app.settle()
+        app.frame()
+        assert viewport.pin is not None
+        assert np.linalg.norm(np.subtract(viewport.pin[0], numbers.hit.position_ws)) < 0.02
+        moved, view = app.on_screen(viewport.pin[0]), viewport.view
+        wanted = int(moved[0] - view.x) + 0.5, int(moved[1] - view.y) + 0.5
+        assert inspector.numbers.key.place == wanted
+        app.key(imgui.Key.p)
+        assert not app.window.lobe.is_pinned
+        app.window.editor.look(camera)
+
+
+def parts_of_the_error(app: Application, out: Path) -> None:
+    """For the pixel and for the view, while frames go on; the picture stays as it is."""
+    inspector, viewport = app.window.inspector, app.window.viewport
+    with comparing(app, show="off", points=4):
+        picture = app.window.renderer.radiance()
+        app.act(lambda ctx: ctx.window_focus("//Inspector"))
+        move_to(app, *app.on_screen((0.3, 0.0, 1.0)))
+        app.act(lambda ctx: ctx.item_click("//Inspector/###pixel parts"))
+        app.until(lambda: not inspector.is_busy)
+        app.frame()
+        found = inspector.parts.result
+        assert found is not None
+        assert found.parts == ("Fresnel", "lobe", "table", "textures", "outline", "float32")
+        assert found.exact.shape == (1, 3)
+        assert np.abs(found.shares[-1]).max() < 1e-5
+        app.act(lambda ctx: ctx.window_focus("//Compare"))
+        app.act(lambda ctx: ctx.item_click("//Compare/###view parts"))
+        work = viewport.comparison.parts
+        assert not viewport.is_idle
+        app.until(lambda: not work.is_busy)
+        app.settle()
+        assert work.result is not None
+        assert work.result.exact.shape == (4, 3)
+        assert work.is_of(viewport.picture)
+        assert np.array_equal(app.window.renderer.radiance(), picture)
+        app.window.renderer.ctx.screen.use()
+        # Of another picture it is no longer; what is under way then is given up.
+        app.act(lambda ctx: ctx.item_click("//Compare/###view parts"))
+        app.window.editor.look(replace(app.scene.camera, eye=(0.2, 1.3, 4.4)))
+        app.settle()
+        assert not work.is_busy
+        assert not work.is_of(viewport.picture)
+
+
 SCENARIOS = (
     flip_between_two_techniques,
     drag_the_divider,
     differences_in_false_colours,
     numbers_of_the_view,
     comparing_costs_nothing_at_rest,
+    inspect_a_pixel,
+    parts_of_the_error,
 )

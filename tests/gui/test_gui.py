@@ -58,6 +58,8 @@ SCENARIOS = (
     "differences_in_false_colours",
     "numbers_of_the_view",
     "comparing_costs_nothing_at_rest",
+    "inspect_a_pixel",
+    "parts_of_the_error",
     "lobe_under_the_pointer",
     "pinned_lobe",
     "lobe_by_hand",
