@@ -100,7 +100,9 @@ class LightNeeds:
             for light, geometry in zip(lights, geometries, strict=True)
             if any(light.radiance) and geometry.parts
         ]
-        curves = parse_technique(technique).curves if has_curves(lights) else 1
+        choice = parse_technique(technique)
+        curves = choice.curves if has_curves(lights) else 1
+        bounded = bounded or choice.technique.is_sampled
         curved = not isinstance(curves, int)
         parts = sum(part_count(item, curves) for item in shining)
         size = TEXELS_PER_NODE if curved else TEXELS_PER_EDGE
@@ -224,6 +226,11 @@ class LightingFeatures:
             and find_technique(technique).anisotropic
             and any(material.is_anisotropic and any(material.f0) for material in used)
         )
+        own_shaders = specular or lights.curves == "whole"
+        own_shaders |= diffuse and find_technique(technique).has_own_diffuse
+        used_technique = lights.technique(technique) if own_shaders else DEFAULT_TECHNIQUE
+        if find_technique(technique).is_sampled and not find_technique(used_technique).is_sampled:
+            lights = LightNeeds.of(scene.lights, limits, used_technique, culls)
         return cls(
             specular,
             diffuse,
@@ -231,11 +238,7 @@ class LightingFeatures:
             samples > 1,
             lights,
             rounded if fits else 0,
-            lights.technique(technique)
-            if specular
-            or lights.curves == "whole"
-            or (diffuse and find_technique(technique).has_own_diffuse)
-            else DEFAULT_TECHNIQUE,
+            used_technique,
             anisotropic,
             view == "cost",
             anisotropic,
@@ -295,6 +298,8 @@ def technique_defines(technique: str, anisotropic: bool) -> dict[str, int]:
     defines = {
         "TECHNIQUE_GGX": int(choice.name == "ggx"),
         "TECHNIQUE_REFERENCE": int(choice.name == "reference"),
+        "TECHNIQUE_RESIDUAL": int(choice.name == "ltc+residual"),
+        "TAKES_SEED": int(choice.technique.is_sampled),
         "TECHNIQUE_REPRESENTATIVE_POINT": int(choice.name == "representative-point"),
         "TAKES_TANGENT": int(takes_tangent),
         "RESIDUAL_AZIMUTHS": azimuths[0],

@@ -49,8 +49,7 @@ class Technique:
         How it takes curves: cut into a tree of pieces that turn little; each as it is; or as
         so many edges as its number says, which makes polygons of them.
     curve_rule : int
-        The feature CURVE_RULE: how it integrates along curves that are whole. The number of
-        a technique that does not is only not 0, which leaves out the tree's own rule.
+        The feature CURVE_RULE: how it integrates along curves that are whole.
     has_own_diffuse : bool
         Whether its diffuse part differs from the form factors that the others share.
     culls : bool
@@ -117,10 +116,15 @@ TECHNIQUES: dict[str, Technique] = {
         "many samples converge to is exact",
         anisotropic=True,
         has_tables=False,
-        curves="whole",
-        curve_rule=3,
         is_sampled=True,
         has_own_diffuse=True,
+    ),
+    "ltc+residual": Technique(
+        "ltc and an estimate of what it lacks, by random directions: right from the first "
+        "sample, exact in the limit",
+        anisotropic=True,
+        has_tables=True,
+        is_sampled=True,
     ),
     "representative-point": Technique(
         "a baseline, what engines did before: each light as its point nearest the mirrored view, "

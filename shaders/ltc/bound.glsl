@@ -2,6 +2,7 @@
 // Twin, derivation and measured slack: ltc.bounds.
 
 #include "common/allowance.glsl"
+#include "common/light_rectangle.glsl"
 #include "ltc/polygon.glsl"
 
 // Where a light is, seen along the axis of a clamped cosine: its heights are within
@@ -33,12 +34,6 @@ float extent_bound(Extent extent)
 float density_bound(float flux, float r2)
 {
     return r2 > 1e-15 ? 0.318309886 * max(flux, 0.0) / (r2 * r2) : 1.0;
-}
-
-// (least s, least t, greatest s, greatest t) about a light's origin [m].
-vec4 light_rectangle(PlanarLight light)
-{
-    return light_texel(light.first_part - 1);
 }
 
 // From the point to the middle of the rectangle, world, and half its sides along the light's axes.

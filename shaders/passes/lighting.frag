@@ -12,6 +12,8 @@
 #include "ggx/shade.glsl"
 #elif TECHNIQUE_REFERENCE
 #include "reference/shade.glsl"
+#elif TECHNIQUE_RESIDUAL
+#include "residual/shade.glsl"
 #elif TECHNIQUE_REPRESENTATIVE_POINT
 #include "representative_point/shade.glsl"
 #else
@@ -39,7 +41,7 @@ uniform int light_count;
 #if CULLS
 uniform float faint_radiance;  // that all that is skipped at a point may add up to
 #endif
-#if TECHNIQUE_REFERENCE
+#if TAKES_SEED
 uniform uint sample_index;
 #endif
 #if HAS_TANGENTS
@@ -84,14 +86,16 @@ vec3 surface_radiance(vec4 surface)
 #endif
 #if TAKES_TANGENT
     vec3 tangent = material_tangent(ivec2(gl_FragCoord.xy), normal, int(surface.w));
+#endif
     return shade_lights(
-#if TECHNIQUE_REFERENCE
+#if TAKES_SEED
         uvec3(gl_FragCoord.xy, sample_index),
 #endif
-        light_count, position, normal, tangent, wo, material);
-#else
-    return shade_lights(light_count, position, normal, wo, material);
+        light_count, position, normal,
+#if TAKES_TANGENT
+        tangent,
 #endif
+        wo, material);
 }
 #endif
 

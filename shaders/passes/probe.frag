@@ -5,6 +5,8 @@
 #include "ggx/shade.glsl"
 #elif TECHNIQUE_REFERENCE
 #include "reference/shade.glsl"
+#elif TECHNIQUE_RESIDUAL
+#include "residual/shade.glsl"
 #elif TECHNIQUE_REPRESENTATIVE_POINT
 #include "representative_point/shade.glsl"
 #else
@@ -19,7 +21,7 @@ uniform sampler2D alphas;     // (alpha_x, alpha_y)
 uniform sampler2D tangents;   // unit, perpendicular to the normal
 #endif
 uniform int light_count;
-#if TECHNIQUE_REFERENCE
+#if TAKES_SEED
 uniform uint sample_index;
 #endif
 
@@ -37,15 +39,16 @@ void main()
     vec3 diffuse_radiance;
 #if TAKES_TANGENT
     vec3 tangent = texelFetch(tangents, place, 0).xyz;
+#endif
     probe_lights(
-#if TECHNIQUE_REFERENCE
-                 uvec3(place, sample_index),
+#if TAKES_SEED
+        uvec3(place, sample_index),
 #endif
-                 light_count, position, normal, tangent, wo, alpha,
-                 specular_radiance, diffuse_radiance);
-#else
-    probe_lights(light_count, position, normal, wo, alpha, specular_radiance, diffuse_radiance);
+        light_count, position, normal,
+#if TAKES_TANGENT
+        tangent,
 #endif
+        wo, alpha, specular_radiance, diffuse_radiance);
     specular = vec4(specular_radiance, 0.0);
     diffuse = vec4(diffuse_radiance, 0.0);
 }

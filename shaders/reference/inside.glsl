@@ -1,6 +1,6 @@
-// Whether a point of a light's plane is on the light, and the light's bounds there. A ray from
-// the point along +s crosses the outline an odd number of times if it is; outlines are simple
-// loops that cross neither themselves nor each other, so holes need no thought.
+// Whether a point of a light's plane is on the light. A ray from the point along +s crosses the
+// outline an odd number of times if it is; outlines are simple loops that cross neither
+// themselves nor each other, so holes need no thought.
 
 #include "common/cost.glsl"
 #include "common/light_data.glsl"
@@ -10,16 +10,10 @@
 
 #if HAS_CURVES
 
-const int PART_TEXELS = 4;
-
-// Whether the curve whose texels begin at `texel` is crossed an odd number of times.
-bool is_crossed(int texel, vec2 at)
+// Whether the cubic whose texels begin at `texel` is crossed an odd number of times.
+bool is_crossed(int texel, vec4 ends, vec2 at)
 {
-    vec4 disc = light_texel(texel + 2);
-    if (abs(at.y - disc.y) > disc.z || at.x - disc.x > disc.z) {
-        return false;
-    }
-    vec4 ends = light_texel(texel);
+    count_evaluations(1);
     vec4 handles = light_texel(texel + 3);
     vec4 s = vec4(ends.x, ends.x + handles.x, ends.z + handles.z, ends.z) - at.x;
     vec4 t = vec4(ends.y, ends.y + handles.y, ends.w + handles.w, ends.w) - at.y;
@@ -38,19 +32,39 @@ bool is_crossed(int texel, vec2 at)
     return odd;
 }
 
-// The corners (least s, least t, greatest s, greatest t) of a box around a part.
-vec4 part_bounds(int texel)
+// `at`: (s, t) [m]. Down the tree: of a node whose disc is all to the right of the point
+// only its ends matter, of one that the ray misses nothing does.
+bool is_on_light(PlanarLight light, vec2 at)
 {
-    vec4 ends = light_texel(texel);
-    vec4 handles = ends + light_texel(texel + 3);
-    return vec4(min(min(ends.xy, ends.zw), min(handles.xy, handles.zw)),
-                max(max(ends.xy, ends.zw), max(handles.xy, handles.zw)));
+    if (dot(at, at) > light.radius * light.radius) {
+        return false;
+    }
+    bool inside = false;
+    int node = 0;
+    while (node < light.part_count) {
+        int texel = light.first_part + 4 * node;
+        vec4 about = light_texel(texel + 2);
+        vec2 away = about.xy - at;
+        bool is_inner = about.w < 0.0;
+        bool is_near = abs(away.y) <= about.z && away.x >= -about.z;
+        if (!is_near || away.x > about.z || !is_inner) {
+            if (is_near) {
+                vec4 ends = light_texel(texel);
+                bool crossed = away.x > about.z ? (ends.y > at.y) != (ends.w > at.y)
+                                                : is_crossed(texel, ends, at);
+                inside = inside != crossed;
+            }
+            node = is_inner ? int(light_texel(texel + 3).x) : node + 1;
+        } else {
+            ++node;
+        }
+    }
+    return inside;
 }
 
 #else
 
-const int PART_TEXELS = 2;
-
+// Whether the edge whose texels begin at `texel` is crossed.
 bool is_crossed(int texel, vec2 at)
 {
     vec4 edge = light_texel(texel);
@@ -63,14 +77,6 @@ bool is_crossed(int texel, vec2 at)
     return (d.x * away.y - d.y * away.x > 0.0) == (d.y > 0.0);
 }
 
-vec4 part_bounds(int texel)
-{
-    vec4 edge = light_texel(texel);
-    return vec4(min(edge.xy, edge.zw), max(edge.xy, edge.zw));
-}
-
-#endif
-
 // `at`: (s, t) [m].
 bool is_on_light(PlanarLight light, vec2 at)
 {
@@ -80,18 +86,9 @@ bool is_on_light(PlanarLight light, vec2 at)
     count_evaluations(light.part_count);
     bool inside = false;
     for (int i = 0; i < light.part_count; ++i) {
-        inside = inside != is_crossed(light.first_part + PART_TEXELS * i, at);
+        inside = inside != is_crossed(light.first_part + 2 * i, at);
     }
     return inside;
 }
 
-// The rectangle (least s, least t, greatest s, greatest t) around a light [m].
-vec4 light_bounds(PlanarLight light)
-{
-    vec4 bounds = vec4(vec2(light.radius), vec2(-light.radius));
-    for (int i = 0; i < light.part_count; ++i) {
-        vec4 part = part_bounds(light.first_part + PART_TEXELS * i);
-        bounds = vec4(min(bounds.xy, part.xy), max(bounds.zw, part.zw));
-    }
-    return vec4(max(bounds.xy, -light.radius), min(bounds.zw, light.radius));
-}
+#endif

@@ -1,5 +1,6 @@
-// GGX and Lambert at given directions, and directions drawn from them. Tangent frame: x the
-// tangent, z the normal; `wo` and `wi` unit, wo.z > 0 for GGX. Twin: ltc.brdf.
+// GGX and transformed cosines at given directions, and directions drawn from them. Tangent
+// frame: x the tangent, z the normal; `wo` and `wi` unit, wo.z > 0 for GGX. Twins: ltc.brdf and
+// ltc.transform.
 
 struct GgxLobe {
     vec3 wo;
@@ -45,10 +46,35 @@ vec3 ggx_direction(GgxLobe lobe, vec2 random)
     return 2.0 * dot(lobe.wo, h) * h - lobe.wo;
 }
 
-// A direction in proportion to its cosine: density wi.z / pi.
-vec3 cosine_direction(vec2 random)
+// A clamped cosine under a linear transform K, cosine_from_tangent: its density over
+// directions w is that of the cosine at K w times det K / |K w|^3. Lambert's has K = 1.
+struct CosineLobe {
+    mat3 points;   // K
+    mat3 normals;  // the cofactor matrix of K
+    float det;     // of K, positive
+};
+
+// Density [1/sr] at the unit direction w, above the surface or below.
+float cosine_value(CosineLobe lobe, vec3 w)
+{
+#if TECHNIQUE_RESIDUAL
+    vec3 c = lobe.points * w;
+    float c2 = dot(c, c);
+    return 0.318309886 * max(c.z, 0.0) * lobe.det / (c2 * c2);
+#else
+    return 0.318309886 * max(w.z, 0.0);
+#endif
+}
+
+// A direction in that density.
+vec3 cosine_direction(CosineLobe lobe, vec2 random)
 {
     float azimuth = 6.28318531 * random.x;
     float r = sqrt(random.y);
-    return vec3(r * cos(azimuth), r * sin(azimuth), sqrt(1.0 - random.y));
+    vec3 c = vec3(r * cos(azimuth), r * sin(azimuth), sqrt(1.0 - random.y));
+#if TECHNIQUE_RESIDUAL
+    return normalize(c * lobe.normals);
+#else
+    return c;
+#endif
 }

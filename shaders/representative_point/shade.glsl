@@ -64,7 +64,7 @@ PointTerms point_terms(
     float most = -2.0;
     count_evaluations(light.part_count);
     for (int i = 0; i < light.part_count; ++i) {
-        vec4 edge = light_texel(light.first_part + PART_TEXELS * i);
+        vec4 edge = light_texel(light.first_part + 2 * i);
         vec3 a = vec3(edge.xy - plane.foot, plane.depth);
         vec3 b = vec3(edge.zw - plane.foot, plane.depth);
         float each = half_solid_angle(centre, a, b, edge.x * edge.w - edge.y * edge.z);

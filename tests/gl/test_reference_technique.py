@@ -1,4 +1,4 @@
-"""Technique `reference`: its mean is the exact integral, and its noise falls as it must.
+"""Techniques that sample: their mean is the exact integral, and their noise falls as it must.
 
 The truths are deterministic float64 integrals that share nothing with it:
 `app.render.truth` along curves, and those of `tests.gl.test_truth` over polygons.
@@ -37,6 +37,9 @@ LARGEST_SAMPLE = 3.0
 """Of a light of radiance 1: three directions, each at most the albedo."""
 FLOAT32 = 2e-5
 """Absolute, for what rounding adds to each sample alike."""
+ANALYTIC = 1e-4
+"""The same for the part of `ltc+residual` that is no estimate: float32 along the outline."""
+TECHNIQUES = ["reference", "ltc+residual"]
 
 STAR = Outline(
     (
@@ -87,38 +90,49 @@ SCENES = {
 }
 
 
-def unlikely(mean: FloatArray, error: FloatArray, exact: FloatArray, samples: int) -> str:
+def unlikely(
+    mean: FloatArray,
+    error: FloatArray,
+    exact: FloatArray,
+    samples: int,
+    rounding: float = FLOAT32,
+) -> str:
     """Return why such means of samples are not those of ``exact``, or nothing.
 
     ``mean``, their standard ``error`` and ``exact`` are (n,), for light of radiance 1. A value
     that is rare among the samples may have been missed: the error knows nothing of it.
     """
-    z = (mean - exact) / np.hypot(error, LARGEST_SAMPLE / samples + FLOAT32)
+    z = (mean - exact) / np.hypot(error, LARGEST_SAMPLE / samples + rounding)
     i = int(np.abs(z).argmax())
     if abs(z[i]) > LARGEST_Z:
         return f"point {i}: {mean[i]:.5f} +- {error[i]:.5f}, expected {exact[i]:.5f}"
     bias = float(np.mean(mean - exact))
-    doubt = float(np.sqrt(np.sum(error**2)) / len(error)) + FLOAT32
+    doubt = float(np.sqrt(np.sum(error**2)) / len(error)) + rounding
     if abs(bias) > LARGEST_Z * doubt:
         return f"mean {mean.mean():.6f} +- {doubt:.6f}, expected {exact.mean():.6f}"
     return ""
 
 
 def estimates(
-    renderer, lights: tuple[AreaLight, ...], points: Points, samples: int
+    renderer,
+    lights: tuple[AreaLight, ...],
+    points: Points,
+    samples: int,
+    technique: str = "reference",
 ) -> tuple[tuple[FloatArray, FloatArray], ...]:
     """Return (mean, standard error), (n,) each, of specular and diffuse red."""
     many = [
         np.repeat(a, samples, axis=0)
         for a in (points.position, points.normal, points.tangent, points.view, points.alpha)
     ]
-    out = renderer.probe(Scene(lights=lights), RenderSettings("reference"), *many)
+    out = renderer.probe(Scene(lights=lights), RenderSettings(technique), *many)
     found = []
     for name in ("specular", "diffuse"):
         values = out[name][:, 0].astype(np.float64).reshape(-1, samples)
         assert np.all(np.isfinite(values))
-        assert values.min() >= 0.0
-        assert values.max() <= LARGEST_SAMPLE * sum(light.radiance[0] for light in lights)
+        largest = LARGEST_SAMPLE * sum(light.radiance[0] for light in lights)
+        assert values.min() >= (-largest if technique == "ltc+residual" else 0.0)
+        assert values.max() <= largest
         found.append((values.mean(axis=1), values.std(axis=1, ddof=1) / np.sqrt(samples)))
     return tuple(found)
 
@@ -140,30 +154,34 @@ def some_points(lights: tuple[AreaLight, ...], seed: int, count: int = 24, **key
     [((0.0, 80.0), (0.05, 1.0)), ((0.0, 80.0), (0.001, 0.05)), ((80.0, 89.0), (0.02, 1.0))],
     ids=["rough", "sharp", "grazing"],
 )
-def test_points_converge_to_the_exact_integral(renderer, name, theta, alpha):
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_points_converge_to_the_exact_integral(renderer, technique, name, theta, alpha):
     lights, samples = SCENES[name], 2048
     points = some_points(lights, len(name), theta=theta, alpha=alpha)
-    found = estimates(renderer, lights, points, samples)
+    found = estimates(renderer, lights, points, samples, technique)
+    rounding = FLOAT32 if technique == "reference" else ANALYTIC
     for (mean, error), want in zip(found, exact(lights, points), strict=True):
-        assert not unlikely(mean, error, want, samples)
+        assert not unlikely(mean, error, want, samples, rounding)
         assert want.max() > 0.05
 
 
 @pytest.mark.parametrize("stretch", [0.95, 1.05])
-def test_a_wrong_lobe_is_rejected(renderer, stretch):
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_a_wrong_lobe_is_rejected(renderer, technique, stretch):
     lights, samples = SCENES["disk"], 12000
     points = some_points(lights, 3, alpha=(0.1, 0.5))
-    (mean, error), _ = estimates(renderer, lights, points, samples)
+    (mean, error), _ = estimates(renderer, lights, points, samples, technique)
     assert not unlikely(mean, error, exact(lights, points)[0], samples)
     assert unlikely(mean, error, exact(lights, points, stretch)[0], samples)
 
 
 @pytest.mark.parametrize("alpha", [(0.05, 0.4), (1.0, 0.02)])
-def test_anisotropic_points(renderer, alpha):
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_anisotropic_points(renderer, technique, alpha):
     (lamp,), samples = SCENES["square"], 2048
     points = some_points((lamp,), 5)
     points = replace(points, alpha=np.tile(alpha, (len(points.position), 1)))
-    (mean, error), _ = estimates(renderer, (lamp,), points, samples)
+    (mean, error), _ = estimates(renderer, (lamp,), points, samples, technique)
     at = points.rounded()
     x = unit(at.tangent - at.normal * np.sum(at.normal * at.tangent, axis=-1, keepdims=True))
     frame = np.stack([x, np.cross(at.normal, x), at.normal], axis=-2)
@@ -219,9 +237,10 @@ def mismatch(pictures: FloatArray, exact: FloatArray, seen: FloatArray) -> str:
 
 
 @pytest.mark.parametrize("height", [1.5, 0.4], ids=["above", "crossing"])
-def test_pictures_of_both_lobes_with_fresnel(renderer, still, height):
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_pictures_of_both_lobes_with_fresnel(renderer, still, technique, height):
     """A brushed floor, so the tangents of the G-buffer count too."""
-    shot = floor(BRUSHED, height)
+    shot = floor(BRUSHED, height, technique)
     exact, seen = test_truth.exact(shot)
     pictures = frames(renderer, shot, 200)
     assert not mismatch(pictures, exact, seen)
@@ -288,17 +307,40 @@ def test_probe_averages_samples(renderer):
 @pytest.mark.parametrize("lamp", [SCENES["square"], SCENES["disk"]], ids=["polygon", "curved"])
 @pytest.mark.parametrize("material", [BRUSHED, replace(BRUSHED, f0=DARK)], ids=["glossy", "matt"])
 def test_compiled_where_it_is_chosen_only(renderer, lamp, material):
-    def files(technique: str) -> tuple[str, ...]:
+    def files(technique: str) -> set[str]:
         shot = floor(material, technique=technique)
         plan = renderer.plan(replace(shot, scene=replace(shot.scene, lights=lamp)))
-        return next(p.files for p in plan.programs if p.name == "lighting")
+        return set(next(p.files for p in plan.programs if p.name == "lighting"))
 
+    estimate = {"reference/estimate.glsl", "common/sequence.glsl"}
+    analytic = {"ltc/shade.glsl", "ltc/contour.glsl"}
     chosen = files("reference")
-    assert "reference/shade.glsl" in chosen
-    assert not {"ltc/shade.glsl", "ltc/lobe.glsl", "ltc/contour.glsl", "ltc/tree.glsl"} & {*chosen}
+    assert estimate <= chosen
+    assert not {*analytic, "ltc/lobe.glsl", "ltc/tree.glsl"} & chosen
     assert ("ltc/curve.glsl" in chosen) is (lamp is SCENES["disk"])
+    both = files("ltc+residual")
+    assert analytic <= both
+    # Lambert has no residual.
+    assert (estimate <= both) is (material is BRUSHED)
     for other in ("auto", "ltc", "ggx"):
-        assert not [name for name in files(other) if "reference/" in name or "sequence" in name]
+        assert not estimate & files(other)
+
+
+def test_residual_leaves_less_noise(renderer, still):
+    """And none at all where all is Lambert's."""
+    shot = floor(replace(BRUSHED, alpha=(0.2, 0.2)))
+    exact, seen = test_truth.exact(shot)
+    deviation = []
+    for technique in TECHNIQUES:
+        renderer.render(replace(shot, settings=RenderSettings(technique, 16)))
+        deviation.append(np.sqrt(np.mean((renderer.radiance() - exact)[seen] ** 2)))
+    assert deviation[1] < 0.5 * deviation[0]
+    matt = replace(BRUSHED, f0=DARK)
+    pictures = []
+    for technique in ("ltc", "ltc+residual"):
+        renderer.render(floor(matt, technique=technique))
+        pictures.append(renderer.radiance())
+    np.testing.assert_array_equal(*pictures)
 
 
 def test_evaluations_are_counted(renderer):

@@ -47,7 +47,6 @@ TWINS = {
     "table_quadrilinear",
     "residual_matrix",
     "anisotropic_lobe",
-    "positive_atan2",
     "product_error",
     "cross_2d",
     "accurate_difference",
@@ -95,7 +94,6 @@ GPU_ONLY = {
     "contour_part": THROUGH_CURVES,
     "extent_bound": "a stage of form_factor_bound, tested with it",
     "density_bound": "a stage of form_factor_bound, tested with it",
-    "light_rectangle": "reads a texel, tested by test_culling.py",
     "way_to_rectangle": "from a texel, tested by test_culling.py",
     "closing_edge": THROUGH_PROBE,
     "meet_horizon": THROUGH_PROBE,
@@ -255,7 +253,7 @@ def test_positive_atan2(glsl):
     y = f32(10 ** rng.uniform(-12, 6, COUNT))
     x = f32(10 ** rng.uniform(-12, 6, COUNT) * rng.choice([-1, 1], COUNT))
     y[:3], x[:3] = [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]
-    got = glsl("ltc/polygon.glsl", "result.x = positive_atan2(y, x);", {"x": x, "y": y})[:, 0]
+    got = glsl("common/atan2.glsl", "result.x = positive_atan2(y, x);", {"x": x, "y": y})[:, 0]
     np.testing.assert_allclose(got, np.arctan2(y, x), rtol=4e-7)
 
 
