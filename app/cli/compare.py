@@ -163,6 +163,8 @@ def compare(
         if count:
             check_breakdown(technique)
         scene = named_scene(first)
+        if count:
+            check_breakdown(technique, scene)
         shot = Shot(scene, RenderSettings(technique, samples), width, height)
         pictures, parts = render_pictures(shot, against, estimates, count)
     found = pictures.numbers(chosen.measure)
@@ -273,7 +275,7 @@ def render_pictures(
 def _points(renderer: Renderer, shot: Shot, count: int) -> Points:
     """Return random points of the picture rendered last, which shows ``shot``."""
     places = random_places((shot.width, shot.height))
-    gathering = Gathering(renderer, shot.scene, shot.settings.technique, places, count)
+    gathering = Gathering(renderer, shot, places, count)
     while not gathering.step():
         pass
     return gathering.points()

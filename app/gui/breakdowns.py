@@ -12,7 +12,7 @@ from app.gui.live_picture import LivePicture
 from app.render.breakdown import Breakdown, break_down
 from app.render.gathering import Gathering, Points, check_breakdown
 from app.render.renderer import Renderer
-from app.scene import Scene
+from app.scene import Shot
 
 GATHERING = 0.008
 """Seconds of a frame for asking the GPU about points."""
@@ -29,20 +29,20 @@ class BreakdownWork:
     Attributes
     ----------
     result : Breakdown or None
-    of : (Scene, str) or None
-        The scene, with the camera of the picture, and the technique that ``result`` is of.
+    of : Shot or None
+        What ``result`` is of.
     problem : str
         Why there is none, empty where there is no reason.
     """
 
     def __init__(self, renderer: Renderer) -> None:
         self.result: Breakdown | None = None
-        self.of: tuple[Scene, str] | None = None
+        self.of: Shot | None = None
         self.problem = ""
         self._renderer = renderer
         self._gathering: Gathering | None = None
         self._wanted = 0
-        self._subject: tuple[Scene, str] | None = None
+        self._subject: Shot | None = None
         self._future: Future[Breakdown] | None = None
         self._steps = (0, 0)
         self._stop = threading.Event()
@@ -63,10 +63,7 @@ class BreakdownWork:
 
     def is_of(self, picture: LivePicture) -> bool:
         """Tell whether the result belongs to what a picture shows."""
-        shot = picture.shot
-        if self.of is None or shot is None:
-            return False
-        return self.of[0] is shot.scene and self.of[1] == shot.settings.technique
+        return self.of is not None and _shows(picture, self.of)
 
     def start(
         self, picture: LivePicture, places: Iterator[tuple[float, float]], wanted: int
@@ -79,14 +76,13 @@ class BreakdownWork:
         if shot is None or picture.has_failed:
             return
         self.result, self.of, self.problem = None, None, ""
-        self._subject, self._wanted = (shot.scene, shot.settings.technique), wanted
-        self._gathering = Gathering(self._renderer, *self._subject, places, wanted)
+        self._subject, self._wanted = shot, wanted
+        self._gathering = Gathering(self._renderer, shot, places, wanted)
 
     def step(self, picture: LivePicture) -> None:
         """Go on for a few milliseconds; call once a frame."""
         if self._gathering is not None:
-            shot = picture.shot
-            if shot is None or self._subject is None or shot.scene is not self._subject[0]:
+            if self._subject is None or not _shows(picture, self._subject):
                 self.cancel()  # the picture is another one now
                 return
             end = time.perf_counter() + GATHERING
@@ -94,7 +90,7 @@ class BreakdownWork:
             while not is_last and time.perf_counter() < end:
                 is_last = self._gathering.step()
             if is_last:
-                self._compute(self._gathering.points(), *self._subject)
+                self._compute(self._gathering.points(), self._subject)
                 self._gathering = None
             self._renderer.ctx.screen.use()
         if self._future is not None and self._future.done():
@@ -104,7 +100,7 @@ class BreakdownWork:
             except CancelledError:
                 return
 
-    def _compute(self, points: Points, scene: Scene, technique: str) -> None:
+    def _compute(self, points: Points, shot: Shot) -> None:
         if not points.count:
             self.problem = "No surface was found."
             return
@@ -117,7 +113,9 @@ class BreakdownWork:
                 raise CancelledError
 
         worker = ThreadPoolExecutor(1, thread_name_prefix="breakdown")
-        self._future = worker.submit(break_down, points, scene, technique, progress)
+        self._future = worker.submit(
+            break_down, points, shot.scene, shot.settings.technique, progress
+        )
         worker.shutdown(wait=False)
 
     def cancel(self) -> None:
@@ -126,10 +124,19 @@ class BreakdownWork:
         self._gathering = self._future = None
 
 
-def refusal(technique: str) -> str:
-    """Return why a technique's error has no parts, empty if it has."""
+def _shows(picture: LivePicture, shot: Shot) -> bool:
+    """Tell whether a picture shows what ``shot`` does, in whatever size."""
+    shown = picture.shot
+    return shown is not None and shown.scene is shot.scene and shown.settings == shot.settings
+
+
+def refusal(picture: LivePicture) -> str:
+    """Return why the parts of a picture's error cannot be told, empty if they can."""
+    shot = picture.shot
+    if shot is None or picture.has_failed:
+        return "There is no picture."
     try:
-        check_breakdown(technique)
+        check_breakdown(shot.settings.technique, shot.scene)
     except InputError as reason:
         return str(reason)
     return ""

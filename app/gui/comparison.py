@@ -31,7 +31,7 @@ from app.render.difference_pass import DifferencePass
 from app.render.gathering import random_places
 from app.render.renderer import Renderer
 from app.render.techniques import find_technique, technique_of
-from app.scene import Camera, RenderSettings, Scene, Shot
+from app.scene import Camera, PixelView, RenderSettings, Scene, Shot
 
 STILL = 0.25
 """Seconds without a change after which numbers are computed."""
@@ -157,15 +157,16 @@ class Comparison:
         *counts, positions = shared_samples(
             settings.samples, (sampled[0], sampled[1]), self.form.estimates
         )
-        return tuple(
-            RenderSettings(
-                name,
-                count,
-                "cost" if self.shows_cost(settings) else "radiance",
-                positions if count > positions else 0,
+        view: PixelView = "cost" if self.shows_cost(settings) else "radiance"
+        a, b = (
+            replace(
+                settings, technique=name, samples=count, view=view,
+                positions=positions if count > positions else 0,
             )
             for name, count in zip(names, counts, strict=True)
-        )
+        )  # fmt: skip
+        # What A skips is part of its error.
+        return a, replace(b, cull=0.0)
 
     def toggle(self) -> None:
         """Switch the comparison off, or on as a split view."""

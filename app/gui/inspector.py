@@ -162,7 +162,6 @@ class Inspector:
 
     def _parts(self, numbers: Numbers) -> Parts:
         work, picture = self.parts, self._viewport.picture
-        assert picture.shot is not None
         found = work.result if self._parts_at == numbers.key.place else None
         return Parts(
             about="Luminance at the pixel's middle, by a single sample. "
@@ -171,7 +170,7 @@ class Inspector:
             rows=pixel_rows(found) if found is not None else (),
             is_current=work.is_of(picture),
             progress=work.progress,
-            refusal=refusal(picture.shot.settings.technique),
+            refusal=refusal(picture),
         )
 
 

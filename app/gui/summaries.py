@@ -86,8 +86,7 @@ def view_parts(work: BreakdownWork, picture: LivePicture) -> Parts:
             for name, mean, p95, most, bias in found.rows()
         )
         about = f"{found.technique} at {len(found.exact)} random pixels' points: luminance"
-    technique = picture.shot.settings.technique if picture.shot is not None else "auto"
     return Parts(
         about, ("mean", "p95", "max", "bias"), rows, work.is_of(picture), work.progress,
-        refusal(technique),
+        refusal(picture),
     )  # fmt: skip

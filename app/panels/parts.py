@@ -13,6 +13,7 @@ WHAT = {
     "lobe": "GGX becomes the linearly transformed cosine that suits the view best",
     "table": "That lobe is read from the table, between its nodes",
     "textures": "The table is read as the GPU samples it, bilinearly",
+    "horizon": "Light below the surface is not cut off, or what is cut off is not made up for",
     "outline": "Curves are integrated by quadrature or as edges; edges exactly",
     "float32": "Single precision",
     "outline and float32": "Quadrature of curves, and single precision",

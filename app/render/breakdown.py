@@ -13,6 +13,9 @@ table
     That lobe and the albedo come from the table of full resolution, between its nodes.
 textures
     They come from what the GPU samples bilinearly (of the anisotropic table the same thing).
+horizon
+    Only of ``ltc``'s variants that do otherwise: light below the surface is not cut off, or what
+    is cut off of the lobe is not made up for.
 outline
     The outline is integrated as the technique does it: edges exactly, curves by quadrature,
     as edges or by subdivision. Of ``ltc``'s own quadrature there is no twin in float64; its
@@ -162,6 +165,8 @@ class _Steps:
         states = [first, *(state for _, state in steps)]
         shares = np.array([after - before for before, after in pairwise(states)])
         names = tuple(name for name, _ in steps)
+        if self.points.skips:
+            names = (*names[:-1], f"{names[-1]}, skipped lights")
         return Breakdown(self.technique, names, first, shares)
 
     # --- sums over the lights ------------------------------------------------------------
@@ -217,8 +222,11 @@ class _Steps:
             whole, cosine = load_isotropic(), np.minimum(self.local[:, 2], 1.0)
             terms = whole.matrix(self.ax, cosine), *whole.albedo_terms(self.ax, cosine)
             steps.append(("table", self._looked_up(*terms) + diffuse))
-            last = sample_textures(isotropic_textures(), self.ax, cosine)
+            texels = isotropic_textures(self.choice.changes.residual)
+            last = sample_textures(texels, self.ax, cosine)
             steps.append(("textures", self._looked_up(*last) + diffuse))
+        if not self.choice.changes.divides:
+            steps.append(("horizon", self._looked_up(*last, divides=False) + diffuse))
         outline = self._outline(last, steps[-1][1])
         if outline is None:
             return [*steps, ("outline and float32", self.points.radiance)]
@@ -230,13 +238,20 @@ class _Steps:
         albedo: FloatArray,
         fresnel: FloatArray,
         integral: Callable[[FloatArray, list[FloatArray]], FloatArray] | None = None,
+        divides: bool = True,
     ) -> FloatArray:
-        """Return the specular radiance of lobes (n, 3, 3), albedo (n,) and its Fresnel part."""
+        """Return the specular radiance of lobes (n, 3, 3), albedo (n,) and its Fresnel part.
+
+        Without ``divides`` light is cut as the technique's variant does it.
+        """
         inverse = transform.invert(matrix)
-        above = 1.0 - transform.leak(matrix)
+        above = 1.0 - transform.leak(matrix) if divides else np.ones(len(matrix))
         factors = []
         for contours in self.contours:
-            if integral is None:
+            if not divides and self.choice.changes.cuts_at_lobe:
+                moved = [np.einsum("nij,nkcj->nkci", inverse, contour) for contour in contours]
+                share = curved_outline.form_factor(moved).value
+            elif integral is None:
                 share = curved_outline.ltc_form_factor(inverse, contours).value
             else:
                 share = integral(inverse, contours)

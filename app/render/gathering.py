@@ -13,15 +13,15 @@ from app.errors import InputError
 from app.render.pack import has_curves
 from app.render.techniques import AUTOMATIC, find_technique, parse_technique, suited_technique
 from app.render.truth import shading_frames
-from app.scene import Material, RenderSettings, Scene
+from app.scene import Material, RenderSettings, Scene, Shot
 
 if TYPE_CHECKING:
     from app.render.renderer import Renderer
 
 FloatArray = NDArray[np.float64]
 
-FINEST = "ltc:6"
-"""The most nodes that curves can be integrated with."""
+FINEST = 6
+"""The most nodes that ``ltc`` can integrate curves with."""
 TRIES = 50
 """Random pixels that are looked at for each point wanted, until enough show a surface."""
 
@@ -42,6 +42,8 @@ class Points:
     finer : (2, n, 3) float64 or None
         How much the specular and diffuse parts of a white material change without the
         quadrature of curves, where that can be told.
+    skips : bool
+        Whether lights too faint to see were skipped.
     """
 
     place: FloatArray
@@ -52,19 +54,26 @@ class Points:
     materials: Sequence[Material]
     radiance: FloatArray
     finer: FloatArray | None
+    skips: bool = False
 
     @property
     def count(self) -> int:
         return len(self.place)
 
 
-def check_breakdown(technique: str) -> None:
-    """Raise `InputError` if a technique's error has no parts."""
+def check_breakdown(technique: str, scene: Scene | None = None) -> None:
+    """Raise `InputError` if a technique's error, or that in a scene, cannot be told apart."""
     if technique != AUTOMATIC and find_technique(technique).is_sampled:
         raise InputError(
             f"technique {technique} errs by the noise of its samples alone, expected one that does "
             "not sample"
         )
+    for light in scene.lights if scene is not None else ():
+        if light.picture is not None:
+            raise InputError(
+                f"light '{light.name}' has a picture, expected lights of one colour: only of those "
+                "is it known which part of an error is whose"
+            )
 
 
 def random_places(size: tuple[int, int], seed: int = 0) -> Iterator[tuple[float, float]]:
@@ -81,7 +90,7 @@ class Gathering:
     Parameters
     ----------
     renderer : Renderer
-        It has rendered ``scene`` with ``technique``; its picture stays as it is.
+        It has rendered ``shot``; its picture stays as it is.
     places : iterator of (x, y)
         Pixel coordinates to look at, `random_places` or a single one.
     wanted : int
@@ -91,13 +100,14 @@ class Gathering:
     def __init__(
         self,
         renderer: Renderer,
-        scene: Scene,
-        technique: str,
+        shot: Shot,
         places: Iterator[tuple[float, float]],
         wanted: int,
     ) -> None:
-        check_breakdown(technique)
+        scene, technique = shot.scene, shot.settings.technique
+        check_breakdown(technique, scene)
         self._renderer, self._scene = renderer, scene
+        self._skips = shot.settings.cull > 0.0
         self.technique = suited_technique(technique, shades_anisotropic(scene, technique))
         self._places, self._wanted = places, wanted
         self._left = TRIES * wanted
@@ -132,13 +142,15 @@ class Gathering:
             table, [2, 5, 8, 11, 14], axis=1
         )
         tangent = _own_tangents(normal, view, tangent, materials)
-        points = Points(place, position, normal, view, tangent, materials, radiance, finer=None)
+        points = Points(
+            place, position, normal, view, tangent, materials, radiance, None, self._skips
+        )
         choice = parse_technique(self.technique)
-        if choice.name == "ltc" and self.technique != FINEST and has_curves(self._scene.lights):
-            return replace(points, finer=self._finer(points))
+        if choice.name == "ltc" and choice.number != FINEST and has_curves(self._scene.lights):
+            return replace(points, finer=self._finer(points, str(choice._replace(number=FINEST))))
         return points
 
-    def _finer(self, points: Points) -> FloatArray:
+    def _finer(self, points: Points, finest: str) -> FloatArray:
         """Return what the technique's own nodes change against the most there can be."""
         alpha = np.array([material.alpha for material in points.materials]).reshape(-1, 2)
         inputs = (points.position, points.normal, points.tangent, points.view, alpha)
@@ -147,7 +159,7 @@ class Gathering:
             self._renderer.probe(
                 self._scene, RenderSettings(name), *inputs, anisotropic=anisotropic
             )
-            for name in (self.technique, FINEST)
+            for name in (self.technique, finest)
         ]
         return np.array(
             [found[0][lobe].astype(np.float64) - found[1][lobe] for lobe in ("specular", "diffuse")]

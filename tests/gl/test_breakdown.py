@@ -43,9 +43,10 @@ def broken_down(
     renderer: Renderer, shown: Scene, technique: str, count: int = 4
 ) -> tuple[Points, Breakdown]:
     # More than a sample: a breakdown is not of what happened to be rendered last.
-    renderer.render(Shot(shown, RenderSettings(technique, 2), *SIZE))
+    shot = Shot(shown, RenderSettings(technique, 2), *SIZE)
+    renderer.render(shot)
     before = renderer.radiance()
-    gathering = Gathering(renderer, shown, technique, random_places(SIZE), count)
+    gathering = Gathering(renderer, shot, random_places(SIZE), count)
     while not gathering.step():
         pass
     points = gathering.points()
@@ -103,6 +104,21 @@ def test_finest_curves_cannot_be_told_from_float32(renderer: Renderer) -> None:
     assert sizes(found)["outline and float32"] < 3e-5
 
 
+@pytest.mark.parametrize("variant", ["table-4", "undivided", "published-clip"])
+def test_variants(renderer: Renderer, variant: str) -> None:
+    """What a variant does otherwise is found where it belongs, and nowhere else."""
+    _, usual = broken_down(renderer, scene(), "ltc", 3)
+    _, found = broken_down(renderer, scene(), f"ltc/{variant}", 3)
+    largest = sizes(found)
+    assert largest["float32"] < 1e-5
+    if variant == "table-4":
+        assert found.parts == TABLE_PARTS
+        assert largest["textures"] > 2.0 * sizes(usual)["textures"]
+    else:
+        assert found.parts == (*TABLE_PARTS[:4], "horizon", "outline", "float32")
+        assert largest["horizon"] > 1e-4
+
+
 @pytest.mark.parametrize("technique", ["ltc", "ggx", "ggx:4"])
 def test_brushed_metal(renderer: Renderer, technique: str) -> None:
     metal = Material("m", (0.0, 0.0, 0.0), (0.9, 0.8, 0.7), (0.1, 0.4), 0.7)
@@ -133,13 +149,14 @@ def test_what_has_fewer_parts(renderer: Renderer) -> None:
     _, found = broken_down(renderer, matt, "auto", 2)
     assert max(sizes(found).values()) < 1e-5
     with pytest.raises(InputError, match="technique reference errs by the noise"):
-        Gathering(renderer, matt, "reference", random_places(SIZE), 1)
+        Gathering(renderer, Shot(matt, RenderSettings("reference")), random_places(SIZE), 1)
 
 
 def test_no_surface_and_no_light(renderer: Renderer) -> None:
     empty = Scene()
-    renderer.render(Shot(empty, RenderSettings("ltc"), *SIZE))
-    gathering = Gathering(renderer, empty, "ltc", random_places(SIZE), 2)
+    shot = Shot(empty, RenderSettings("ltc"), *SIZE)
+    renderer.render(shot)
+    gathering = Gathering(renderer, shot, random_places(SIZE), 2)
     while not gathering.step():
         pass
     found = break_down(gathering.points(), empty, "ltc")
@@ -148,3 +165,14 @@ def test_no_surface_and_no_light(renderer: Renderer) -> None:
     dark = Scene(scene().materials, scene().objects)
     _, found = broken_down(renderer, dark, "ltc", 1)
     assert np.all(found.total == 0.0)
+
+
+def test_what_was_skipped_is_named(renderer: Renderer) -> None:
+    shot = Shot(scene(), RenderSettings("ltc", cull=0.004), *SIZE)
+    renderer.render(shot)
+    gathering = Gathering(renderer, shot, random_places(SIZE), 1)
+    while not gathering.step():
+        pass
+    found = break_down(gathering.points(), shot.scene, "ltc")
+    assert found.parts[-1] == "float32, skipped lights"
+    assert sizes(found)["float32, skipped lights"] <= 0.004 + 1e-5
