@@ -33,7 +33,7 @@ left out. The median, because a light in the crop would be all that a mean or ma
 TOO_BRIGHT, TOO_DARK = (255, 140, 0), (60, 140, 255)
 """Colours that remain apart with any colour vision; no difference is black."""
 
-QUALITY = 70
+QUALITY = 55
 """Of 100: some three hundred pictures shall be a page of two megabytes."""
 
 FloatArray = NDArray[np.float64]

@@ -21,6 +21,7 @@ STYLES: Mapping[str, tuple[str, Shape]] = {
     "adaptive-extrapolated": ("#12a5a5", "down"),
     "uniform": ("#ae4ad6", "diamond"),
     "reference": ("#868e96", "cross"),
+    "ltc+residual": ("#5c940d", "cross"),
     "representative-point": ("#e03177", "triangle"),
 }
 """Colour and shape by kind, see `kind_of`; each at least 3:1 against white and against black."""
@@ -83,7 +84,7 @@ def summary_rows(rows: Sequence[Row]) -> list[Row]:
     )
     for scene in by_scene.values():
         for entry in entries:
-            if "ltc" in scene and entry.known.has_tables and not entry.variant:
+            if "ltc" in scene and entry.looks_up and not entry.variant:
                 scene.setdefault(str(entry), scene["ltc"])
     names = [str(entry) for entry in entries]
     shared = [scene for scene in by_scene.values() if set(names) <= set(scene)]

@@ -26,7 +26,7 @@ from app.render.timers import is_software
 from app.scene import RenderSettings, Scene, Shot
 
 TECHNIQUES = (
-    "ltc", "ggx:1", "ggx", "ggx:4", "representative-point",
+    "ltc", "ggx:1", "ggx", "ggx:4", "representative-point", "ltc+residual:16",
     "reference:1", "reference:4", "reference:16", "reference:64",
 )  # fmt: skip
 CURVED = ("ltc:2", "adaptive", "uniform")

@@ -33,6 +33,7 @@ TABLES = ("ltc/no-table", "ltc/table-4", "ltc/table-8", "ltc/table-32")
 OTHERS = (
     "ltc/undivided", "ltc/published-clip",
     "representative-point",
+    "ltc+residual:1", "ltc+residual:4", "ltc+residual:16", "ltc+residual:64",
     "reference:1", "reference:4", "reference:16", "reference:64", "reference:256",
 )  # fmt: skip
 
@@ -60,6 +61,11 @@ class Entry:
         return (
             self.samples if self.known.is_sampled else parse_technique(self.technique).number or 0
         )
+
+    @property
+    def looks_up(self) -> bool:
+        """Whether what it converges to is the fitted lobe of tables."""
+        return self.known.has_tables and not self.known.is_sampled
 
     @property
     def variant(self) -> str:
@@ -120,6 +126,6 @@ def entries_of(scene: Scene, wanted: Sequence[str] = ()) -> tuple[Entry, ...]:
         entry = parse_entry(resolved)
         # Without curves these are the very programs of "ltc".
         choice = parse_technique(entry.technique)
-        alike = not curved and entry.known.has_tables and not wanted
+        alike = not curved and entry.looks_up and not wanted
         found.append(Entry(str(choice.without_curves)) if alike else entry)
     return tuple(sorted(dict.fromkeys(found), key=Entry.place))

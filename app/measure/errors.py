@@ -117,7 +117,7 @@ def choose_points(renderer: Renderer, scene: Scene, count: int) -> SurfacePoints
 
 def own_lobe(entry: Entry) -> Lobe | None:
     """Return the lobe whose integral a technique approximates, None if it has no such aim."""
-    if entry.known.has_tables and not entry.known.is_sampled:
+    if entry.looks_up:
         return str(parse_technique(entry.technique).without_curves)
     return None if entry.name == "representative-point" else "ggx"
 
