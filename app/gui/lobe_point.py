@@ -14,14 +14,14 @@ from app import contours
 from app.lobe_picture import directions_above
 from app.panels.lobe_pictures import LightLine
 from app.render.camera import world_from_object
-from app.render.picking import Hit, facing_normal
-from app.render.truth import shading_contours, shading_frames
+from app.render.picking import Hit, facing_normal, turned_tangent
+from app.render.truth import shading_contours, shading_frames, tangent_frames
 from app.scene import AreaLight, Camera, Scene
 from ltc import transform
 from ltc.bezier import evaluate
 from ltc.curved_outline import ltc_form_factor
 from ltc.curved_reference import curve_specular_integral_batch
-from ltc.lobe import THETA_MAX, Case, LobePair, about_normal
+from ltc.lobe import THETA_MAX, Case, LobePair
 
 FloatArray = NDArray[np.float64]
 
@@ -102,7 +102,12 @@ def subject_of(point: SurfacePoint, scene: Scene, camera: Camera) -> Subject | N
         ax = ay = math.sqrt(ax * ay)
         note = "This technique shades it as isotropic."
     elif ax != ay and point.tangent is not None:
-        frame = _tangent_frame(normal, linear @ point.tangent, material.rotation)
+        # Unit, as the G-buffer holds it: a short one would count as a pole of the tangents.
+        way = linear @ point.tangent
+        turned = turned_tangent(
+            (way / np.linalg.norm(way))[None], normal[None], np.array([material.rotation])
+        )
+        frame = tangent_frames(normal[None], turned)[0]
     x, y, z = (frame @ wo).tolist()
     theta = min(math.atan2(math.hypot(x, y), z), float(THETA_MAX))
     phi = math.atan2(y, x) if ax != ay else 0.0
@@ -113,18 +118,6 @@ def subject_of(point: SurfacePoint, scene: Scene, camera: Camera) -> Subject | N
         position,
         frame,
     )
-
-
-def _tangent_frame(normal: FloatArray, tangent: FloatArray, rotation: float) -> FloatArray:
-    """Return the rows x, y, z of a material's frame, as ``shaders/passes/lighting.frag``."""
-    t = tangent - normal * (normal @ tangent)
-    length = float(np.linalg.norm(t))
-    if not length > 1e-4 * float(np.linalg.norm(tangent)):  # at a pole of the mesh's tangents
-        axis = [1.0, 0.0, 0.0] if abs(normal[0]) < 0.5 else [0.0, 1.0, 0.0]
-        t = np.array(axis) - normal * (normal @ np.array(axis))
-        length = float(np.linalg.norm(t))
-    frame = np.stack([t / length, np.cross(normal, t / length), normal])
-    return np.asarray(about_normal(rotation).T @ frame)
 
 
 def light_lines(

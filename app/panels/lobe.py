@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 from imgui_bundle import imgui
 
 from app.panels.lobe_pictures import LobeView, lobe_pictures
-from app.panels.widgets import ACCENT, MUTED, button, heading, hint, slider, tooltip
+from app.panels.widgets import ACCENT, MUTED, button, heading, hint, right_text, slider, tooltip
 from ltc.lobe import THETA_MAX, Case, LobePair
 from ltc.table import ALPHA_MIN
 
@@ -199,10 +199,7 @@ def _matrix(pair: LobePair) -> None:
             tooltip("Turns a cosine lobe about the normal into this one; x is the tangent")
             for value in row:
                 imgui.table_next_column()
-                text = f"{value:.4f}"
-                room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
-                imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
-                imgui.text_unformatted(text)
+                right_text(f"{value:.4f}")
         imgui.end_table()
 
 

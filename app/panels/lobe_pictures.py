@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 NARROWEST = 9.0
 """Width of a picture in font sizes from which on three stand in a row."""
-LABELLED = 13.0
+LABELLED = 11.0
 """Width in font sizes from which on marks have their names written beside them."""
 NEAR = 0.6
 """Distance from a mark in font sizes within which the pointer reads its name."""

@@ -10,7 +10,7 @@ import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from app.panels.measurement import Measurement, measurement_section
-from app.panels.widgets import ACCENT, hint, tooltip
+from app.panels.widgets import ACCENT, hint, right_text, tooltip
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +43,7 @@ def performance_panel(report: Report, measurement: Measurement) -> Literal["", "
             imgui.table_next_column()
             imgui.text(name)
             imgui.table_next_column()
-            text = f"{milliseconds:.2f} ms"
-            room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
-            imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
-            imgui.text(text)
+            right_text(f"{milliseconds:.2f} ms")
         imgui.end_table()
     if len(report.history) > 1:
         _history(np.asarray(report.history, dtype=np.float64))

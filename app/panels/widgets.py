@@ -55,6 +55,13 @@ def label(text: str, tip: str = "") -> str:
     return f"##{text.lower()}"
 
 
+def right_text(text: str) -> None:
+    """Draw text at the right end of a table's cell."""
+    room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
+    imgui.text_unformatted(text)
+
+
 def heading(text: str) -> None:
     """Draw the title of a group of rows."""
     imgui.spacing()
