@@ -89,7 +89,6 @@ def report_page(
 
 def _about_times(rows: Sequence[Row]) -> str:
     clocks = sorted({row["timing"] for row in rows})
-    uncertain = max((row["truth_uncertainty"] for row in rows), default=0.0)
     text = f"<p>Times are medians per pass by {escape(' and '.join(clocks))}"
     if "wall clock" in clocks:
         text += (
@@ -110,10 +109,30 @@ def _about_times(rows: Sequence[Row]) -> str:
         ". Of a technique that samples they are those of all its samples: <code>reference:64</code>"
         " is 64 samples a pixel, and its error is their noise. A pixel's <em>evaluations</em> of "
         "the integral along the outlines depend on no machine, but one of another technique is "
-        "other work. The exact integrals differ from finer ones, at every eighth of their points, "
-        f"by {uncertain:.0e} at most; no error below that means anything. All numbers are in "
-        "<code>results.csv</code> and <code>results.json</code>.</p>"
+        f"other work. {_about_truth(rows)} All numbers are in <code>results.csv</code> and "
+        "<code>results.json</code>.</p>"
     )
+
+
+def _about_truth(rows: Sequence[Row]) -> str:
+    """Return how exact the truths are themselves."""
+    exact, sampled = (
+        [row["truth_uncertainty"] for row in rows if row["truth"] == kind]
+        for kind in ("exact", "reference")
+    )
+    text = ""
+    if exact:
+        text += (
+            "The exact integrals differ from finer ones, at every eighth of their points, by "
+            f"{max(exact):.0e} at most; no error below that means anything."
+        )
+    if sampled:
+        text += (
+            " Lights with pictures have no exact integral here: there the truth is what "
+            f"<code>reference</code> converges to, with a standard error of {max(sampled):.0e} "
+            "at most."
+        )
+    return text
 
 
 def _summary(rows: Sequence[Row]) -> list[str]:

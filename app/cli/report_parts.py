@@ -68,7 +68,8 @@ def read_truth(path: Path, origin: Origin) -> tuple[SurfacePoints, Truth] | None
                 position, normal, tangent, view, alpha, bool(arrays["anisotropic"])
             )
             uncertainty = float(arrays["uncertainty"])
-            return points, Truth(arrays["specular"], arrays["diffuse"], uncertainty)
+            values = arrays["specular"], arrays["diffuse"]
+            return points, Truth(*values, uncertainty, bool(arrays["sampled"]))
     except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):
         return None
 
@@ -83,6 +84,7 @@ def write_truth(path: Path, origin: Origin, points: SurfacePoints, truth: Truth)
         "specular": truth.specular,
         "diffuse": truth.diffuse,
         "uncertainty": truth.uncertainty,
+        "sampled": truth.sampled,
     }
     np.savez_compressed(buffer, **arrays)
     replace_file(path, buffer.getvalue(), KIND)

@@ -38,10 +38,12 @@ from app.measure.errors import (
     Truth,
     choose_points,
     exact_truth,
+    has_exact_truth,
     lit_evenly,
     mean_evaluations,
     own_lobe,
     probe_errors,
+    sampled_truth,
 )
 from app.measure.front import pareto_front
 from app.measure.times import measure_passes
@@ -63,6 +65,9 @@ WARM_UP = 2
 
 TIMED_SAMPLES = 4
 """Most samples of a pixel that are timed: each takes as long as any other."""
+
+TRUTH_SAMPLES = 16384
+"""Of ``reference`` at a point, where there is no exact integral."""
 
 KIND = "a report"
 
@@ -230,7 +235,9 @@ class _Run:
         found: dict[str, Truths] = {target.name: {} for target in targets}
         for target in targets:
             missing = [e for e in target.entries if self._known(target, e) is None]
-            lobes = {"ggx", *(own_lobe(entry) or "ggx" for entry in missing)} if missing else set()
+            lobes = {"ggx"} if missing else set()
+            if has_exact_truth(target.scene):
+                lobes |= {own_lobe(entry) or "ggx" for entry in missing}
             for lobe in sorted(lobes):
                 path = part_path(self._parts, target.name, f"truth-{lobe}", ".npz")
                 known = None if self._again else read_truth(path, self._origin(target))
@@ -250,8 +257,12 @@ class _Run:
                 steps.done(done)
 
             for target, lobe in wanted:
-                points = self._chosen[target.name]
-                truth = exact_truth(lit_evenly(target.scene), points, lobe, executor, more)
+                points, scene = self._chosen[target.name], lit_evenly(target.scene)
+                if has_exact_truth(scene):
+                    truth = exact_truth(scene, points, lobe, executor, more)
+                else:
+                    truth = sampled_truth(self._renderer, scene, points, TRUTH_SAMPLES)
+                    more(len(points))
                 path = part_path(self._parts, target.name, f"truth-{lobe}", ".npz")
                 write_truth(path, self._origin(target), points, truth)
                 found[target.name][lobe] = truth
@@ -325,8 +336,10 @@ class _Run:
         scene, points = lit_evenly(target.scene), self._chosen[target.name]
         own = own_lobe(entry)
         to_ggx = probe_errors(renderer, scene, entry, points, truths["ggx"])
-        to_own = probe_errors(renderer, scene, entry, points, truths[own]) if own else {}
+        truth = truths.get(own) if own else None
+        to_own = probe_errors(renderer, scene, entry, points, truth) if truth else {}
         figures["points"] = len(points)
+        figures["truth"] = "reference" if truths["ggx"].sampled else "exact"
         figures["truth_uncertainty"] = truths["ggx"].uncertainty
         # Lambert is the same for both.
         for name, errors in (

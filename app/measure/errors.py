@@ -62,11 +62,16 @@ class SurfacePoints:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Radiance (n,) for F = 1 and albedo 1, and the error that it may itself have, absolute."""
+    """Radiance (n,) for F = 1 and albedo 1, and the error that it may itself have, absolute.
+
+    That is the largest difference from a finer integral, or, of a truth that was ``sampled``, the
+    largest standard error.
+    """
 
     specular: FloatArray
     diffuse: FloatArray
     uncertainty: float
+    sampled: bool = False
 
 
 @dataclass(frozen=True)
@@ -113,6 +118,11 @@ def choose_points(renderer: Renderer, scene: Scene, count: int) -> SurfacePoints
         for array in (seen.position[which], normal, tangent, view, alphas[seen.index[which]])
     )
     return SurfacePoints(position, normal, tangent, view, alpha, seen.tangent is not None)
+
+
+def has_exact_truth(scene: Scene) -> bool:
+    """Return whether `exact_truth` integrates what a scene's lights send: not their pictures."""
+    return not any(light.picture is not None and any(light.radiance) for light in scene.lights)
 
 
 def own_lobe(entry: Entry) -> Lobe | None:
@@ -211,7 +221,7 @@ def sampled_truth(renderer: Renderer, scene: Scene, points: SurfacePoints, sampl
         means.append(each.mean(axis=0))
         error = each.std(axis=0, ddof=1) / np.sqrt(REPLICAS)
         worst = max(worst, float(error.max(initial=0.0)))
-    return Truth(means[0], means[1], worst)
+    return Truth(means[0], means[1], worst, sampled=True)
 
 
 def probe_errors(

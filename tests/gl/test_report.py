@@ -115,6 +115,7 @@ def test_figures(made: Path) -> None:
         assert (row["table_bytes"] > 0) is looks_up
         assert row["evaluations"] > 0.0
         assert 0.0 < row["lighting_q1_ms"] <= row["lighting_ms"] <= row["lighting_q3_ms"]
+        assert row["truth"] == "exact"
         assert 0.0 <= row["truth_uncertainty"] < 1e-6
         for name in ("specular_ggx", "diffuse"):
             assert 0.0 <= row[f"{name}_mean"] <= row[f"{name}_max"]
@@ -317,6 +318,27 @@ def test_two_truths_agree(made: Path, renderer) -> None:
             # The largest standard error of all, four times, from eight estimates each.
             assert apart.max() < 4.0 * sampled.uncertainty
             assert apart.mean() < sampled.uncertainty
+
+
+def test_without_exact_integrals_the_reference_is_the_truth(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Errors then are those to its mean; the page says so, with its standard error."""
+    monkeypatch.setattr(report_run, "has_exact_truth", lambda scene: False)
+    monkeypatch.setattr(report_run, "TRUTH_SAMPLES", 4096)
+    wanted = ("ltc", "ggx:4")
+    page = run_report(
+        [str(made / "disk.json")], tmp_path / "out", techniques=wanted, size=(48, 32), points=40,
+        repeats=1,
+    )  # fmt: skip
+    for row in json.loads((tmp_path / "out/results.json").read_text())["rows"]:
+        exact = rows_of(made)["disk", row["technique"]]
+        assert row["truth"] == "reference"
+        assert 0.0 < row["truth_uncertainty"] < 0.01
+        assert row["specular_own_mean"] is None or row["technique"] == "ggx:4"
+        apart = abs(row["specular_ggx_mean"] - exact["specular_ggx_mean"])
+        assert apart < row["truth_uncertainty"]
+    assert "converges to, with a standard error of" in page.read_text(encoding="utf-8")
 
 
 def test_entries(made: Path) -> None:
