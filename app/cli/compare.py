@@ -27,7 +27,13 @@ from app.colour_maps import SEQUENTIAL
 from app.errors import InputError, expected_one_of
 from app.images import IMAGE_SUFFIXES, check_image_path, read_image, save_image
 from app.render.breakdown import Breakdown, break_down
-from app.render.comparison import SAMPLED, Pictures, shared_samples
+from app.render.comparison import (
+    SAMPLED,
+    Pictures,
+    earlier_samples,
+    estimated_error,
+    shared_samples,
+)
 from app.render.difference import (
     DIFFERENCE_VIEWS,
     LUMINANCE,
@@ -248,21 +254,31 @@ def render_pictures(
     names = technique_of(scene, shot.settings.technique), technique_of(scene, against)
     sampled = [find_technique(name).is_sampled for name in names]
     a, b, positions = shared_samples(shot.settings.samples, (sampled[0], sampled[1]), estimates)
-    radiance, shown, points = [], [], None
+    radiance, shown, noise, points = [], [], [], None
     with headless_renderer() as (ctx, renderer), Steps("rendering", a + b) as steps:
         for name, samples in zip(names, (a, b), strict=True):
             settings = replace(shot.settings, technique=name, positions=positions, samples=1)
             wanted = replace(shot, settings=settings)
             before = steps.count
+            random = find_technique(name).is_sampled
+            fewer = earlier_samples(samples, positions) if random else 0
+            error = None
             while (done := renderer.accumulate(wanted, samples)) < samples:
                 ctx.finish()
                 steps.done(before + done)
+                if done == fewer:
+                    error = renderer.radiance()
             steps.done(before + samples)
             radiance.append(renderer.radiance())
+            if error is not None:
+                error = estimated_error(radiance[-1], samples, error, fewer)
+            noise.append(error)
             shown.append(renderer.display())
             if count and name == names[0] and points is None:
                 points = _points(renderer, wanted, count)
-    pictures = Pictures(names, radiance[0], radiance[1], shown[0], shown[1], scene.lights)
+    pictures = Pictures(
+        names, radiance[0], radiance[1], shown[0], shown[1], scene.lights, (noise[0], noise[1])
+    )
     if points is None:
         return pictures, None
     if not points.count:
@@ -330,7 +346,7 @@ def numbers_table(pictures: Pictures, found: Numbers, mean_flip: float | None) -
         table.add_column("of the brightest light", justify="right")
     for name, value, of_b, of_light in found.rows():
         shares = [of_b, of_light] if found.light is not None else [of_b]
-        name = name.replace("A ", f"{a} ").replace("B's", f"{b}'s")
+        name = name.replace("A ", f"{a} ").replace("A's", f"{a}'s").replace("B's", f"{b}'s")
         table.add_row(name, f"{value:.3g}", *(_percent(share) for share in shares))
     empty = [""] * (len(table.columns) - 2)
     table.add_row(f"mean of {b}", f"{found.mean_b:.3g}", *empty)

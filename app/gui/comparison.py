@@ -22,7 +22,7 @@ from app.gui.breakdowns import BreakdownWork
 from app.gui.legend import draw_legend
 from app.gui.live_picture import LivePicture, Reporter, draw_texture
 from app.gui.overlays import View
-from app.gui.summaries import Source, Summary, number_rows
+from app.gui.summaries import EarlierMeans, Source, Summary, number_rows
 from app.panels import compare as panel
 from app.panels.compare import Comparing
 from app.render.comparison import Pictures, shared_samples
@@ -95,6 +95,7 @@ class Comparison:
         self._a: LivePicture | None = None
         self._side: _Side | None = None
         self._pending: Future[Summary] | None = None
+        self._earlier = EarlierMeans()
         self._scene: Scene | None = None
         self._still_since = 0.0
         self._pixels = (0, 0)
@@ -187,6 +188,7 @@ class Comparison:
         if side is not None:
             side.release()
         self.summary = self._pending = self._scene = None
+        self._earlier = EarlierMeans()
 
     # --- one frame -------------------------------------------------------------------
 
@@ -211,6 +213,9 @@ class Comparison:
             self._side = _Side(self._a_renderer, self._reporter)
         side, self._a, self._pixels = self._side, a, pixels
         side.picture.render(scene, camera, settings[1], pixels)
+        if self.sampled:
+            self._earlier.watch(0, a, self._a_renderer)
+            self._earlier.watch(1, side.picture, side.renderer)
         now = time.monotonic()
         shown = a.shot.scene if a.shot is not None else None
         if shown is not self._scene:
@@ -256,7 +261,8 @@ class Comparison:
         shown = [r.display() if source.flips else nothing for r in renderers]
         self._a_renderer.ctx.screen.use()
         lights = source.shots[0].scene.lights
-        return Pictures(self.names, a, b, shown[0], shown[1], lights)
+        noise = self._earlier.noise(source, self.names, (a, b))
+        return Pictures(self.names, a, b, shown[0], shown[1], lights, noise)
 
     # --- on the screen -----------------------------------------------------------------
 

@@ -35,8 +35,8 @@ class Pictures:
         What the display shows of them, sRGB.
     lights : sequence of AreaLight
         The scene's; empty where pictures come from files.
-    standard_error : (h, w, 3) float32 or None
-        Of B's pixels, where B is an estimate that knows it.
+    noise : pair of (h, w, 3) float32 or None
+        `estimated_error` of A and B, where they are random estimates.
     """
 
     names: tuple[str, str]
@@ -45,11 +45,11 @@ class Pictures:
     shown_a: NDArray[np.uint8]
     shown_b: NDArray[np.uint8]
     lights: Sequence[AreaLight] = ()
-    standard_error: NDArray[np.float32] | None = None
+    noise: tuple[NDArray[np.float32] | None, NDArray[np.float32] | None] = (None, None)
 
     def numbers(self, measure: Measure) -> Numbers:
         """Return the differences in numbers."""
-        return of.numbers(self.a, self.b, measure, self.lights, self.standard_error)
+        return of.numbers(self.a, self.b, measure, self.lights, self.noise)
 
     def flip(self) -> NDArray[np.float64]:
         """Return FLIP of what the display shows, (h, w)."""
@@ -74,6 +74,36 @@ class Pictures:
         both = np.array(self.shown_a)
         both[:, middle:] = self.shown_b[:, middle:]
         return _labelled(both, self.names)
+
+
+def estimated_error(
+    mean: NDArray[np.float32], samples: int, earlier: NDArray[np.float32], fewer: int
+) -> NDArray[np.float32]:
+    """Return an estimate of the standard error of a mean of random samples, of any shape.
+
+    Parameters
+    ----------
+    mean, samples
+        The mean, and of how many samples it is.
+    earlier, fewer
+        The mean of the first ones, fewer but some, at the same positions in the pixel.
+
+    Notes
+    -----
+    With n1 samples first and n2 after, both means have the same variance a sample, s^2, so
+    (mean - earlier)^2 n1/n2 has the expectation s^2/n. Of a single pixel it says little, its mean
+    over a picture much. Samples that avoid each other err less than it says.
+    """
+    return np.asarray(np.abs(mean - earlier) * np.sqrt(fewer / (samples - fewer)), np.float32)
+
+
+def earlier_samples(samples: int, positions: int) -> int:
+    """Return after how many samples to keep a mean for `estimated_error`, 0 for never.
+
+    Half of them, as far as that is a multiple of the positions they take in turn.
+    """
+    rounds = samples // positions
+    return rounds // 2 * positions
 
 
 def shared_samples(

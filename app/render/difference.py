@@ -81,8 +81,9 @@ class Numbers:
         Mean of B.
     light : float or None
         The largest radiance of any light, None where that is not known.
-    noise : float or None
-        Root of the mean square of B's standard error, None where B is no estimate.
+    noise : (float or None, float or None)
+        Root of the mean square of A's and of B's standard error; None where one is the same
+        every time, or not known to err.
     """
 
     measure: Measure
@@ -96,7 +97,7 @@ class Numbers:
     max: float
     mean_b: float
     light: float | None = None
-    noise: float | None = None
+    noise: tuple[float | None, float | None] = (None, None)
 
     @property
     def floor(self) -> float:
@@ -109,8 +110,13 @@ class Numbers:
             ("mean", self.mean), ("RMSE", self.rmse), ("95 % below", self.p95),
             ("99 % below", self.p99), ("largest", self.max), ("A brighter by", self.bias),
         ]  # fmt: skip
-        if self.noise is not None:
-            values.append(("B's own error", self.noise))
+        for name, noise in zip("AB", self.noise, strict=True):
+            if noise is not None:
+                values.append((f"{name}'s own noise", noise))
+        if any(self.noise):
+            # Of two errors that know nothing of each other the squares add up.
+            noise2 = sum(noise * noise for noise in self.noise if noise is not None)
+            values.append(("RMSE without it", float(np.sqrt(max(self.rmse**2 - noise2, 0.0)))))
         of_b, of_light = self.mean_b or None, self.light or None
         return [
             (name, value, value / of_b if of_b else None, value / of_light if of_light else None)
@@ -123,7 +129,7 @@ def numbers(
     b: ArrayLike,
     measure: Measure = "luminance",
     lights: Sequence[AreaLight] = (),
-    standard_error: ArrayLike | None = None,
+    noise: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
 ) -> Numbers:
     """Return the numbers of two pictures (h, w, 3) of linear radiance.
 
@@ -131,8 +137,8 @@ def numbers(
     ----------
     lights : sequence of AreaLight
         The scene's, if there is one: differences are also given as a share of the brightest.
-    standard_error : (h, w, 3) or (h, w) float, optional
-        Of B's pixels, where B is an estimate.
+    noise : pair of (h, w, 3) float or None
+        The standard errors of A's and B's pixels, where they are estimates.
 
     Raises
     ------
@@ -150,18 +156,19 @@ def numbers(
     apart = np.abs(signed)
     p95, p99 = np.quantile(apart, (0.95, 0.99))
     radiances = [float(magnitude(light.radiance, measure)) for light in lights]
-    noise = None
-    if standard_error is not None:
-        error = np.asarray(standard_error, dtype=np.float64)
-        if error.ndim == 3:
+    sizes = []
+    for error in noise:
+        size = None
+        if error is not None:
             # Channels of one estimate rise and fall together: an upper bound.
-            error = magnitude(error, measure)
-        noise = float(np.sqrt(np.mean(error[good] ** 2))) if good.any() else 0.0
+            squares = magnitude(np.asarray(error)[good], measure) ** 2
+            size = float(np.sqrt(squares.mean())) if squares.size else 0.0
+        sizes.append(size)
     return Numbers(
         measure, good.size, int(good.size - np.count_nonzero(good)),
         float(signed.mean()), float(apart.mean()), float(np.sqrt(np.mean(apart * apart))),
         float(p95), float(p99), float(apart.max()), float(seen.mean()),
-        max(radiances) if radiances and max(radiances) > 0.0 else None, noise,
+        max(radiances) if radiances and max(radiances) > 0.0 else None, (sizes[0], sizes[1]),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from PIL import Image
 from app.cli.compare import read_pictures
 from app.cli.main import run
 from app.images import exr_bytes, png_bytes, read_image
-from app.render.comparison import shared_samples
+from app.render.comparison import earlier_samples, estimated_error, shared_samples
 from app.render.difference import Scale, colours_of, difference
 from app.render.flip import flip
 from tests.gl.test_command_line import LIT, read_exr
@@ -108,6 +108,11 @@ def test_a_random_estimate_gets_more_samples_at_the_same_places(said: Said) -> N
     )
     assert many["rmse"] < 0.4 * few["rmse"]
     assert abs(many["bias"]) < 0.01
+    # What the estimates say of themselves is all that there is, and rather too much.
+    for found in (few, many):
+        assert found["noise"][0] is None
+        assert 0.8 * found["rmse"] < found["noise"][1] < 2.5 * found["rmse"]
+    assert "reference's own noise" in said("compare", "lit.json", *SIZE, "--estimates", "4")
 
 
 def test_samples_that_both_take() -> None:
@@ -117,6 +122,19 @@ def test_samples_that_both_take() -> None:
     assert shared_samples(1, (False, False)) == (1, 1, 1)
     a, b, positions = shared_samples(60000, (True, True), 65536)
     assert a == b == positions == 60000
+
+
+def test_standard_errors_from_two_means() -> None:
+    """Of independent samples the estimate's mean square is the mean's variance."""
+    rng = np.random.default_rng(8)
+    draws = rng.normal(3.0, 2.0, (48, 20_000)).astype(np.float32)
+    for fewer in (16, 24, 40):
+        found = estimated_error(draws.mean(0), 48, draws[:fewer].mean(0), fewer)
+        # Within three standard errors of a mean of 20,000 squares, 1 %, and float32.
+        assert np.mean(found**2) == pytest.approx(4.0 / 48.0, rel=0.035)
+    assert earlier_samples(256, 16) == 128
+    assert earlier_samples(48, 16) == 16
+    assert earlier_samples(16, 16) == 0
 
 
 def test_files_that_are_no_number_everywhere(said: Said) -> None:

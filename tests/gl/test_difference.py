@@ -147,7 +147,7 @@ def test_numbers():
     a[0, 0] += (0.5, 0.0, 0.0)
     a[0, 1] -= 0.1
     b[9, 9] = np.nan
-    found = numbers(a, b, "largest channel", one_light().lights, np.full((10, 10), 0.3))
+    found = numbers(a, b, "largest channel", one_light().lights, (None, np.full((10, 10, 3), 0.3)))
     assert isinstance(found, Numbers)
     assert (found.pixels, found.bad) == (100, 1)
     assert found.max == 0.5
@@ -155,7 +155,7 @@ def test_numbers():
     assert found.bias == pytest.approx(0.4 / 99.0)
     assert found.rmse == pytest.approx(np.sqrt((0.25 + 0.01) / 99.0))
     assert found.mean_b == 2.0
-    assert found.noise == pytest.approx(0.3)
+    assert found.noise == (None, pytest.approx(0.3))
     assert found.light == max(one_light().lights[0].radiance)
     shares = {name: (of_b, of_light) for name, _, of_b, of_light in found.rows()}
     assert shares["largest"] == pytest.approx((0.25, 0.5 / found.light))

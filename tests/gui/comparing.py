@@ -191,6 +191,17 @@ def numbers_of_the_view(app: Application, out: Path) -> None:
         lines = copied[0].splitlines()
         assert lines[0] == "ltc compared with ggx:4"
         assert lines[1].split("\t")[:2] == ["mean", f"{wanted.mean:.3g}"]
+        assert wanted.noise == (None, None)
+        # A random estimate knows how much of the difference is its own.
+        form = comparison.form
+        comparison.form = replace(form, against="reference", estimates=4)
+        app.settle()
+        assert comparison.picture.samples == (4, 4)
+        found = comparison.summary.numbers
+        assert found.noise[0] is None
+        assert found.noise[1] is not None
+        assert 0.3 * found.rmse < found.noise[1] < 3.0 * found.rmse
+        comparison.form = form
         # An edit makes them old, then they are renewed.
         app.window.editor.apply("Turn off", replace(app.scene, lights=()))
         app.frame()
