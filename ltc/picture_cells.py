@@ -19,12 +19,13 @@ everything, as the caller says: towards the side where the surface's horizon is 
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from ltc import bezier
+from ltc.quadrature import gauss_legendre
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.intp]
@@ -93,7 +94,7 @@ def patches(
         The integral of F over a light is the sum over its patches of the integral of
         F (dv/dt) (du/ds) dt ds.
     """
-    curve, lo, hi = _cuts(curves, (columns, rows))
+    curve, lo, hi = _cuts(curves, (columns, rows), 0.5)
     pieces = bezier.part(curves[curve], lo, hi)
     item = item[curve]
     rising = np.any(np.diff(pieces[..., 1], axis=-1) != 0.0, axis=-1)
@@ -135,18 +136,24 @@ def patches(
     return Patches(owner[order], shape[order], side[order], cells[order])
 
 
-def _cuts(curves: FloatArray, size: tuple[int, int]) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return (curve, from, to) of the parts of curves (m, 4, 2) between lines of texel centres."""
+def _cuts(
+    curves: FloatArray, size: tuple[int, int], offset: float
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return (curve, from, to) of the parts of curves (m, 4, 2) between the lines of a grid.
+
+    The lines are at (k + offset)/n, from k = 0 while they are at 1 or less.
+    """
     m = curves.shape[0]
     found = [(np.arange(m), np.zeros(m)), (np.arange(m), np.ones(m))]
     for axis, n in enumerate(size):
         x = curves[..., axis]
-        first = np.clip(np.ceil(np.min(x, axis=-1) * n - 0.5), 0, n).astype(np.intp)
-        last = np.clip(np.floor(np.max(x, axis=-1) * n - 0.5), -1, n - 1).astype(np.intp)
+        most = n - int(np.ceil(offset))
+        first = np.clip(np.ceil(np.min(x, axis=-1) * n - offset), 0, most + 1).astype(np.intp)
+        last = np.clip(np.floor(np.max(x, axis=-1) * n - offset), -1, most).astype(np.intp)
         count = np.maximum(last - first + 1, 0)
         which = np.repeat(np.arange(m), count)
         line = first[which] + np.arange(which.size) - np.repeat(np.cumsum(count) - count, count)
-        places, changes = bezier.sign_changes(x[which] - ((line + 0.5) / n)[:, None])
+        places, changes = bezier.sign_changes(x[which] - ((line + offset) / n)[:, None])
         row, j = np.nonzero(np.arange(3) < changes[:, None])
         found.append((which[row], places[row, j]))
     curve = np.concatenate([c for c, _ in found])
@@ -157,12 +164,54 @@ def _cuts(curves: FloatArray, size: tuple[int, int]) -> tuple[IntArray, FloatArr
     return curve[:-1][inside], t[:-1][inside], t[1:][inside]
 
 
-def bilinear(picture: FloatArray, uv: FloatArray) -> FloatArray:
+def coverage(curves: FloatArray, columns: int, rows: int) -> FloatArray:
+    """Return which share of each texel an outline covers.
+
+    Parameters
+    ----------
+    curves : (m, 4, 2) float64
+        Closed outlines in picture coordinates, counter-clockwise about u x v, holes the other
+        way; simple, so that no point is covered twice.
+    columns, rows : int
+        Texels of the rectangle [0, 1]^2.
+
+    Returns
+    -------
+    (rows, columns) float64
+        Exact areas over the texel's, in [0, 1].
+
+    Notes
+    -----
+    Green's theorem again: a piece of outline within a texel adds the area between itself and
+    the texel's right side, and its rise to all texels further right. The area is a
+    polynomial of degree 5 in the curve's parameter, which three nodes integrate exactly.
+    """
+    curve, lo, hi = _cuts(curves, (columns, rows), 0.0)
+    pieces = bezier.part(curves[curve], lo, hi)
+    middle = bezier.evaluate(pieces, np.full(len(pieces), 0.5)) * [columns, rows]
+    # What is left of the rectangle covers as much of a row as its left side would.
+    column = np.maximum(np.floor(middle[:, 0]), -1.0).astype(np.intp)
+    row = np.floor(middle[:, 1]).astype(np.intp)
+    within = (row >= 0) & (row < rows) & (column < columns)
+    pieces, column, row = pieces[within], column[within], row[within]
+    x, w = gauss_legendre(3)
+    at = bezier.evaluate(pieces[:, None], x)[..., 0] * columns
+    rise = bezier.derivative(pieces[:, None], x)[..., 1] * rows * w
+    # Outwards to the right the outline rises: it ends the cover, so all signs are turned.
+    area, step = np.zeros((rows, columns + 1)), np.zeros((rows, columns + 1))
+    own = np.sum(rise * (column[:, None] + 1.0 - at), axis=1)
+    np.add.at(area, (row, column), np.where(column >= 0, own, 0.0))
+    np.add.at(step, (row, column + 1), np.sum(rise, axis=1))
+    covered = -(area + np.cumsum(step, axis=1))[:, :columns]
+    return np.asarray(np.clip(covered, 0.0, 1.0) + 0.0)  # no -0
+
+
+def bilinear(picture: npt.NDArray[Any], uv: FloatArray) -> FloatArray:
     """Return a picture's values at points.
 
     Parameters
     ----------
-    picture : (rows, columns, C) float64
+    picture : (rows, columns, C) float
         Texels; the centre of [j, i] is at u = (i + 1/2)/columns, v = (j + 1/2)/rows.
     uv : (..., 2) float64
         Points; beyond the outermost centres the edge goes on.

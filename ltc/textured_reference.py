@@ -43,7 +43,9 @@ _PANELS = 8192  # at a time
 class Lobe(Protocol):
     """What light is weighted with: a density over directions, for n configurations."""
 
-    count: int
+    @property
+    def count(self) -> int:
+        """How many there are."""
 
     def frames(self, frames: FloatArray) -> FloatArray:
         """Return the lights (n, 3, 3) in the space where they are integrated."""
