@@ -19,6 +19,7 @@ KEPT = {
     "parts": "so is how many edges, or curves, they have",
     "technique": "chosen by the user, as is its number",
     "exact_fma": "a property of the machine",
+    "pictures": "there is nothing to look up for lights without",
     "anisotropic": "its tables are another fit: isotropic pictures change by the fits' error, 4e-3",
     "counts": "a view of its own, not a part of the picture",
 }

@@ -22,6 +22,7 @@ from app.render.pack import (
     TEXELS_PER_LIGHT,
     TEXELS_PER_MATERIAL,
     TEXELS_PER_NODE,
+    TEXELS_PER_PICTURE,
     CurveForm,
     has_curves,
     light_geometry,
@@ -30,6 +31,9 @@ from app.render.pack import (
 from app.render.tables import anisotropic_azimuths
 from app.render.techniques import DEFAULT_TECHNIQUE, find_technique, parse_technique
 from app.scene import AreaLight, PixelView, Scene
+
+PICTURE_TAPS = 5
+"""Looks at a picture for a lobe, along the longer axis of what it sees of it."""
 
 STORAGE_TEXTURE_WIDTH = 1024
 """Texels in a row of the textures that hold lights or materials too many for a block."""
@@ -72,7 +76,8 @@ class LightNeeds:
     ``curves`` says how curves are packed, ``parts`` counts what they then are:
     edges, nodes of trees, or the curves themselves; ``bounded`` is whether the rectangle
     around each is packed too; ``uniform_texels`` is the uniform
-    block's array length, 0 where the lights need a texture (or there are none).
+    block's array length, 0 where the lights need a texture (or there are none); ``pictures``
+    counts the lights that have one to show.
     """
 
     count: int
@@ -84,6 +89,7 @@ class LightNeeds:
     two_sided: bool
     uniform_texels: int
     exact_fma: bool
+    pictures: int = 0
 
     @classmethod
     def of(
@@ -106,7 +112,9 @@ class LightNeeds:
         curved = not isinstance(curves, int)
         parts = sum(part_count(item, curves) for item in shining)
         size = TEXELS_PER_NODE if curved else TEXELS_PER_EDGE
+        pictures = sum(light.picture is not None for light in shining)
         texels = (TEXELS_PER_LIGHT + int(bounded)) * len(lights) + size * parts
+        texels += TEXELS_PER_PICTURE * pictures
         if texels > limits.storage_texels:
             raise InputError(
                 f"lights: {len(lights)} lights with {parts} {'curves' if curved else 'edges'} "
@@ -123,6 +131,7 @@ class LightNeeds:
             any(light.two_sided for light in shining),
             rounded if 16 * rounded <= limits.uniform_block_bytes else 0,
             limits.exact_fma,
+            pictures,
         )
 
     @property
@@ -150,6 +159,8 @@ class LightNeeds:
             "HAS_TWO_SIDED": int(self.two_sided),
             "HAS_CURVES": int(self.curved),
             "HAS_EXACT_FMA": int(self.exact_fma),
+            "HAS_PICTURES": int(self.pictures > 0),
+            "PICTURE_TAPS": PICTURE_TAPS if self.pictures else 0,
             "LIGHT_STORAGE_UNIFORM": int(self.uniform_texels > 0),
             "LIGHT_TEXELS": self.uniform_texels,
             "STORAGE_TEXTURE_WIDTH": STORAGE_TEXTURE_WIDTH,

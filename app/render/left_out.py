@@ -64,6 +64,8 @@ def left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
         leave("light-curve program and outlines", "no visible light has curves")
     elif features.lit and not has_triangles(scene.lights):
         leave("light-shape program and triangles", "every visible light has curves")
+    if features.lit and not lights.pictures:
+        leave("picture atlas and the programs that fill it", "no light has a picture")
     if features.shades and not lights.two_sided:
         leave("light from back sides", "no light is two-sided")
     if features.shades and not lights.one_sided:

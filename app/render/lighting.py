@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from app.render.camera import CameraFrame
 from app.render.features import LightingFeatures, LightNeeds, probe_defines
 from app.render.pack import pack_lights, pack_materials
+from app.render.picture_layout import PictureLayout
+from app.render.pictures import PictureAtlas
 from app.render.programs import Programs, ProgramSpec, set_uniform
 from app.render.state import FullScreenTriangle, begin_pass, release_framebuffer
 from app.render.storage import TexelStorage
@@ -28,6 +30,7 @@ SURFACES, TANGENTS, HISTORY, LIGHTS, MATERIALS, FIRST_TABLE = range(6)
 POINT_INPUTS = ("positions", "normals", "tangents", "views", "alphas")
 FIRST_POINT_UNIT = 8
 """Behind the units of the tables."""
+PICTURES = FIRST_POINT_UNIT + len(POINT_INPUTS)
 
 PROBE_SIDE = 1024
 """Points are probed in pictures of at most this side."""
@@ -58,6 +61,7 @@ class LightingPass:
         self._programs = programs
         self._lights = TexelStorage(ctx, "light", "Lights")
         self._materials = TexelStorage(ctx, "material", "Materials")
+        self._pictures = PictureAtlas(ctx, programs)
         self._tables: dict[str, moderngl.Texture | moderngl.TextureArray] = {}
         self._tables_hold: tuple[bool, int | None] = (False, None)
         self._triangle = FullScreenTriangle(ctx)
@@ -65,13 +69,24 @@ class LightingPass:
 
     @property
     def uploads(self) -> dict[str, int]:
-        """How often lights and materials were sent to the GPU."""
-        return {"lights": self._lights.uploads, "materials": self._materials.uploads}
+        """How often lights, materials and pictures were sent to the GPU."""
+        return {
+            "lights": self._lights.uploads,
+            "materials": self._materials.uploads,
+            "pictures": self._pictures.filtered,
+        }
 
-    def set_lights(self, lights: Sequence[AreaLight], needs: LightNeeds) -> None:
-        """Hold the texels of ``lights``."""
+    def set_lights(
+        self, lights: Sequence[AreaLight], needs: LightNeeds, pictures: PictureLayout
+    ) -> None:
+        """Hold the texels of ``lights``, and of where their pictures are."""
         self._light_count = len(lights)
-        self._lights.update(pack_lights(lights, needs.curves, needs.bounded), needs.uniform_texels)
+        texels = pack_lights(lights, needs.curves, needs.bounded, pictures.records())
+        self._lights.update(texels, needs.uniform_texels)
+
+    def set_pictures(self, pictures: PictureLayout) -> bool:
+        """Hold pictures and their blurred levels; return whether anything changed."""
+        return self._pictures.update(pictures)
 
     def set_materials(self, materials: Sequence[Material], uniform_texels: int) -> None:
         """Hold one record per object."""
@@ -81,6 +96,7 @@ class LightingPass:
         """Release what the scene no longer needs."""
         if lights:
             self._lights.release()
+            self._pictures.release()
         if materials:
             self._materials.release()
         if tables:
@@ -227,6 +243,7 @@ class LightingPass:
     def _bind_shading(self, program: moderngl.Program) -> None:
         set_uniform(program, "light_count", self._light_count)
         self._lights.bind(program, LIGHTS)
+        self._pictures.bind(program, PICTURES)
         for unit, (name, texture) in enumerate(self._tables.items(), start=FIRST_TABLE):
             if name in program:
                 set_uniform(program, name, unit)
@@ -236,7 +253,11 @@ class LightingPass:
         """Return the bytes of every buffer and table held, by name."""
         held = {
             name: storage.bytes
-            for name, storage in (("lights", self._lights), ("materials", self._materials))
+            for name, storage in (
+                ("lights", self._lights),
+                ("materials", self._materials),
+                ("light pictures", self._pictures),
+            )
             if storage.bytes
         }
         for name, texels in table_textures(*self._tables_hold).items():

@@ -15,6 +15,7 @@ from app.render.features import LightingFeatures, Limits
 from app.render.gbuffer import objects_spec
 from app.render.light_shapes import curve_texels, has_triangles
 from app.render.lighting import lighting_spec
+from app.render.pictures import PICTURE_PROGRAMS
 from app.render.programs import ProgramSpec
 from app.render.techniques import DEFAULT_TECHNIQUE
 from app.scene import PixelView, Scene
@@ -90,6 +91,8 @@ def needs_of(
             programs.append(gbuffer.LIGHTS)
         if everything or outlines:
             programs.append(gbuffer.CURVED_LIGHTS)
+        if lighting.lights.pictures:
+            programs.extend(PICTURE_PROGRAMS)
         programs.append(lighting_spec(lighting))
     attachments.append("radiance")
     if lighting.lit and lighting.accumulates:

@@ -11,7 +11,7 @@ Everything is computed in float64 and rounded once.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -44,7 +44,7 @@ LIGHT_HEADER = np.dtype(
         ("v_low", "<f4", 3),
         ("blue", "<f4"),
         ("n_low", "<f4", 3),
-        ("unused", "<f4"),
+        ("picture", "<f4"),
     ]
 )
 """Eight texels. Indices and counts are floats, exact up to 2^24; ``low`` is what
@@ -65,6 +65,7 @@ MATERIAL_RECORD = np.dtype(
 TEXELS_PER_LIGHT = LIGHT_HEADER.itemsize // 16
 TEXELS_PER_MATERIAL = MATERIAL_RECORD.itemsize // 16
 TEXELS_PER_EDGE = 2
+TEXELS_PER_PICTURE = 5
 TEXELS_PER_NODE = 4
 MAX_INDEX = 2**24
 """Texel indices are stored as float32."""
@@ -212,9 +213,14 @@ def edges_of(loops: Sequence[FloatArray]) -> FloatArray:
 
 
 def pack_lights(
-    lights: Sequence[AreaLight], curves: CurveForm | None = None, bounded: bool = False
+    lights: Sequence[AreaLight],
+    curves: CurveForm | None = None,
+    bounded: bool = False,
+    pictures: Mapping[int, NDArray[np.void]] | None = None,
 ) -> NDArray[np.float32]:
-    """Return (n, 4) float32 texels: all headers, then all edges, or all nodes.
+    """Return (n, 4) float32 texels: all headers, then all edges, or all nodes, then pictures.
+
+    ``pictures`` are records of `app.render.picture_layout` by the index of their light.
 
     If one light has curves (`has_curves`) every light's outline becomes a tree, so
     that one walk serves all, unless ``curves`` says otherwise. A light without
@@ -233,8 +239,17 @@ def pack_lights(
     counts = np.array([len(parts) for parts in outlines], dtype=np.int64)
     before = np.cumsum(counts) - counts
     header["first_part"] = TEXELS_PER_LIGHT * len(lights) + before + int(bounded)
+    records = [np.zeros((0, 4), np.float32)]
+    texel = TEXELS_PER_LIGHT * len(lights) + int(counts.sum())
+    for index, record in (pictures or {}).items():
+        header["picture"][index] = texel
+        # Stored pictures are relative to their largest value.
+        for colour in ("red", "green", "blue"):
+            header[colour][index] *= record["largest"][0]
+        records.append(record.view(np.float32).reshape(-1, 4))
+        texel += len(records[-1])
     texels = header.view(np.float32).reshape(-1, 4)
-    return np.concatenate([texels, *outlines])
+    return np.concatenate([texels, *outlines, *records])
 
 
 def light_bounds(light: AreaLight) -> NDArray[np.float32]:

@@ -23,6 +23,7 @@ from app.render.light_shapes import (
 )
 from app.render.needs import FORMAT_BYTES, needs_of
 from app.render.pack import TEXELS_PER_MATERIAL
+from app.render.picture_layout import lay_pictures
 from app.render.post import display_spec
 from app.render.programs import ProgramSpec
 from app.render.reasons import counted, program_reason, resource_reason
@@ -184,7 +185,7 @@ def make_plan(shot: Shot, limits: Limits, roots: Sequence[Path], everything: boo
         ),
         resources((name, form, pixels * FORMAT_BYTES[form]) for name, form in needs.attachments),
         resources(_tables(features)),
-        resources(_buffers(scene, features)),
+        resources(_buffers(scene, features, settings.time, limits)),
         tuple(_passes(shot, features)),
         left_out(shot, features),
     )
@@ -212,7 +213,9 @@ def _tables(features: LightingFeatures) -> Iterator[tuple[str, str, int]]:
         yield name, form, int(texels.nbytes)
 
 
-def _buffers(scene: Scene, features: LightingFeatures) -> Iterator[tuple[str, str, int]]:
+def _buffers(
+    scene: Scene, features: LightingFeatures, time: float, limits: Limits
+) -> Iterator[tuple[str, str, int]]:
     """Yield name, form and bytes of each buffer."""
     if not features.lit:
         return
@@ -230,6 +233,10 @@ def _buffers(scene: Scene, features: LightingFeatures) -> Iterator[tuple[str, st
         form = f"RGBA32F texture, {counted(len(shapes), 'outline')} in {bands}"
         yield "light curves", form, storage_bytes(len(outlines), 0)
     yield _storage("lights", lights.texels, lights.uniform_texels)
+    if lights.pictures:
+        atlas = lay_pictures(scene.lights, time, limits.texture_side)
+        form = f"RGBA16F texture, {atlas.width} x {atlas.height}, pictures and their levels"
+        yield "light pictures", form, atlas.bytes
     if features.shades:
         texels = TEXELS_PER_MATERIAL * len(scene.objects)
         yield _storage("materials", texels, features.uniform_materials)

@@ -40,6 +40,8 @@ def program_reason(name: str, shot: Shot, features: LightingFeatures) -> str:
         ]
         verb = "is" if len(seen) == 1 else "are"
         return f"{named(seen, 'light')} {verb} visible, with {'curves' if curves else 'edges only'}"
+    if name.startswith("picture "):
+        return f"{counted(features.lights.pictures, 'light')} with a picture, blurred beforehand"
     if name == "lighting":
         lobes = [lobe for lobe, on in (("glossy", features.specular), ("matt", features.diffuse))
                  if on]  # fmt: skip
@@ -73,6 +75,7 @@ def resource_reason(name: str, shot: Shot, features: LightingFeatures) -> str:
         "lights": f"{counted(len(scene.lights), 'light')}, "
         f"{counted(features.lights.parts, features.lights.part_name)}"
         f"{', a rectangle around each' if features.lights.bounded else ''}",
+        "light pictures": f"{counted(features.lights.pictures, 'light')} with a picture",
         "materials": f"{counted(len(scene.objects), 'object')}, a record each",
     }
     return fixed.get(name, "")

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from app.errors import InputError
+from app.pictures import load_frame
 from app.render.camera import CameraFrame
 from app.render.features import LightingFeatures, LightNeeds, Limits
 from app.render.gbuffer import GBufferPass
@@ -24,6 +25,7 @@ from app.render.lighting import LightingPass
 from app.render.needs import ATTACHMENTS, FORMAT_BYTES, Needs, needs_of
 from app.render.pack import CurveForm
 from app.render.picking import Hit, Picker, direction_from_octahedral, facing_normal, turned_tangent
+from app.render.picture_layout import NO_PICTURES, lay_pictures
 from app.render.plan import Plan, make_plan
 from app.render.post import DisplayPass
 from app.render.programs import Programs
@@ -178,6 +180,7 @@ class Renderer:
     def __init__(self, ctx: moderngl.Context, everything: bool = False) -> None:
         self.ctx = ctx
         self.everything = everything
+        self._pictures = NO_PICTURES
         self.limits = Limits.of(ctx)
         self.programs = Programs(ctx)
         self.lighting_passes = 0
@@ -223,6 +226,7 @@ class Renderer:
             self._seen is None
             or self._stale
             or not self._seen.same_radiance(shot)
+            or self._has_new_frames(shot)
             or (limit > 1 and self._needs is not None and not self._needs.lighting.accumulates)
         )
         if restart:
@@ -354,7 +358,7 @@ class Renderer:
         self._hold_geometry(shot.scene, self._gbuffer.has_tangents)
         frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
         size = (shot.width, shot.height)
-        self._hold_shading(shot.scene, lighting)
+        self._hold_shading(shot.scene, lighting, shot.settings.time)
         return self._picker.shade(
             self._gbuffer, self._lighting, lighting, frame, size, x, y, _faint_radiance(shot)
         )
@@ -472,7 +476,7 @@ class Renderer:
         if not (needs.one_sided or needs.two_sided) or not count:
             zero = np.zeros((count, 3), dtype=np.float32)
             return {"specular": zero, "diffuse": zero.copy()}
-        self._hold_lights(scene, needs)
+        self._hold_lights(scene, needs, settings.time)
         if find_technique(technique).has_tables:
             residual = parse_technique(technique).changes.residual
             self._lighting.load_tables(anisotropic, residual)
@@ -585,7 +589,7 @@ class Renderer:
             self.programs.get(spec)
         if features.lit:
             self._hold_geometry(scene, features.tangents)
-            self._hold_shading(scene, features)
+            self._hold_shading(scene, features, shot.settings.time)
         if features.shades:
             self._hold_materials(scene, features.uniform_materials)
         self._lighting.drop(
@@ -642,7 +646,7 @@ class Renderer:
             window = (1.0, 1.0, -2.0 * offset[0] / shot.width, -2.0 * offset[1] / shot.height)
             names = ("gbuffer", "tangents") if needs.lighting.tangents else ("gbuffer",)
             surfaces = self._targets.framebuffer(*names, depth=True)
-            self._hold_shading(shot.scene, needs.lighting)
+            self._hold_shading(shot.scene, needs.lighting, shot.settings.time)
             with self._timers.measure("gbuffer"):
                 self._gbuffer.draw(surfaces, frame, window)
             with self._timers.measure("lighting"):
@@ -678,18 +682,33 @@ class Renderer:
             self._gbuffer.set_lights(scene.lights)
         self._held = scene
 
-    def _hold_shading(self, scene: Scene, features: LightingFeatures) -> None:
+    def _hold_shading(self, scene: Scene, features: LightingFeatures, time: float) -> None:
         """Hold lights and tables, which a probe may have changed in between."""
-        self._hold_lights(scene, features.lights)
+        self._hold_lights(scene, features.lights, time)
         if features.reads_tables:
             self._lighting.load_tables(features.anisotropic, features.residual_size)
 
-    def _hold_lights(self, scene: Scene, needs: LightNeeds) -> None:
+    def _hold_lights(self, scene: Scene, needs: LightNeeds, time: float) -> None:
         held = self._held_lights
         layout = (needs.curves, needs.bounded, needs.uniform_texels)
-        if held is None or held[0] is not scene.lights or held[1] != layout:
-            self._lighting.set_lights(scene.lights, needs)
+        if needs.pictures:
+            pictures = lay_pictures(scene.lights, time, self.limits.texture_side)
+        else:
+            pictures = NO_PICTURES
+        changed = self._lighting.set_pictures(pictures)
+        if held is None or held[0] is not scene.lights or held[1] != layout or changed:
+            self._lighting.set_lights(scene.lights, needs, pictures)
             self._held_lights = (scene.lights, layout)
+        self._pictures = pictures
+
+    def _has_new_frames(self, shot: Shot) -> bool:
+        """Return whether a picture would be another one now: it plays, or its file changed."""
+        time = shot.settings.time
+        return any(
+            picture.light.picture is not None
+            and load_frame(picture.light.picture, time) is not picture.frame
+            for picture in self._pictures.pictures.values()
+        )
 
     def _hold_materials(self, scene: Scene, uniform_texels: int) -> None:
         held = self._held_materials

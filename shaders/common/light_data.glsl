@@ -5,7 +5,8 @@
 //   1: u.xyz,         number of its edges, or nodes
 //   2: v.xyz,         bounding radius about the origin [m]
 //   3: n.xyz = u x v, 1 if the light emits to both sides
-//   4 to 7: what rounding to float32 took from origin, u, v, n; radiance in the w of 4 to 6
+//   4 to 7: what rounding to float32 took from origin, u, v, n; radiance in the w of 4 to 6, and
+//      in that of 7 the index of its picture's first texel, or 0 (common/light_picture.glsl)
 //   edge: (a.s, a.t, b.s, b.t) [m] in the orthonormal basis u, v about the origin,
 //         interior on the left seen from the emitting side, that of n; then what rounding took.
 //
@@ -38,6 +39,9 @@ struct PlanarLight {
     int first_part;
     int part_count;
     bool two_sided;
+#if HAS_PICTURES
+    int picture;  // 0: none
+#endif
 };
 
 PlanarLight light_at(int index)
@@ -65,6 +69,9 @@ PlanarLight light_at(int index)
     light.first_part = int(t0.w);
     light.part_count = int(t1.w);
     light.two_sided = t3.w != 0.0;
+#if HAS_PICTURES
+    light.picture = int(t7.w);
+#endif
     return light;
 }
 

@@ -12,11 +12,21 @@
 #if CULLS
 #include "ggx/bound.glsl"
 #endif
+#if HAS_PICTURES
+#include "ltc/picture.glsl"
+#if HAS_SPECULAR
+#include "ltc/anisotropic.glsl"
+#endif
+#endif
 
-// Integrals of a light of radiance 1 at a point.
+// Integrals of a light of radiance 1 at a point; what its picture sends instead of white.
 struct GgxTerms {
     vec2 specular;  // for F = 1, and with the weight (1 - wo.h)^5
     float diffuse;  // form factor
+#if HAS_PICTURES
+    vec3 specular_colour;
+    vec3 diffuse_colour;
+#endif
 };
 
 GgxTerms ggx_terms(
@@ -26,7 +36,11 @@ GgxTerms ggx_terms(
 #endif
     )
 {
+#if HAS_PICTURES
+    GgxTerms terms = GgxTerms(vec2(0.0), 0.0, vec3(1.0), vec3(1.0));
+#else
     GgxTerms terms = GgxTerms(vec2(0.0), 0.0);
+#endif
     vec3 normal = world_from_tangent[2];
     PlaneView plane = plane_view(light, position);
     if (is_unseen(light, plane, normal)) {
@@ -63,6 +77,24 @@ GgxTerms ggx_terms(
     terms.diffuse = clamp(
         light_winding(plane) * light_form_factor(light, diffuse, plane, normal), 0.0, 1.0);
 #endif
+#if HAS_PICTURES
+    if (light.picture > 0) {
+        LightPicture picture = picture_at(light.picture);
+#if HAS_SPECULAR
+        if (terms.specular.x > 0.0) {
+            // Where the lobe looks and how wide, by the closed form alone: no table.
+            AnisotropicLobe lobe = anisotropic_lobe(alpha, wo_tangent, mat3(1.0));
+            terms.specular_colour = picture_average(
+                picture, cosine_transform(lobe, world_from_tangent), light, plane);
+        }
+#endif
+#if HAS_DIFFUSE
+        if (terms.diffuse > 0.0) {
+            terms.diffuse_colour = picture_average(picture, diffuse, light, plane);
+        }
+#endif
+    }
+#endif
     return terms;
 }
 
@@ -88,7 +120,12 @@ vec3 shade_lights(
 #endif
         vec3 specular =
             material.f0 * (terms.specular.x - terms.specular.y) + has_lobe * terms.specular.y;
+#if HAS_PICTURES
+        radiance += light.radiance * (specular * terms.specular_colour +
+                                      material.diffuse * terms.diffuse * terms.diffuse_colour);
+#else
         radiance += light.radiance * (specular + material.diffuse * terms.diffuse);
+#endif
     }
     return radiance;
 }
@@ -106,8 +143,13 @@ void probe_lights(
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
         GgxTerms terms = ggx_terms(light, position, world_from_tangent, wo_tangent, alpha);
+#if HAS_PICTURES
+        specular += light.radiance * terms.specular_colour * terms.specular.x;
+        diffuse += light.radiance * terms.diffuse_colour * terms.diffuse;
+#else
         specular += light.radiance * terms.specular.x;
         diffuse += light.radiance * terms.diffuse;
+#endif
     }
 }
 #endif

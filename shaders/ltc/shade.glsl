@@ -12,6 +12,10 @@
 #include "common/tangent_frame.glsl"
 #endif
 
+#if HAS_PICTURES
+#include "ltc/picture.glsl"
+#endif
+
 // A point to be shaded. Where the tables tell alpha_x from alpha_y (TAKES_TANGENT) x is the
 // tangent, else along the view.
 struct SurfacePoint {
@@ -118,6 +122,32 @@ vec2 form_factors_at(
 }
 #endif
 
+#if HAS_PICTURES
+// What the specular and the diffuse lobe see of a light's picture; white without one.
+mat2x3 seen_pictures(PlanarLight light, SurfacePoint point, CosineTransform specular, vec2 factors)
+{
+    mat2x3 colours = mat2x3(vec3(1.0), vec3(1.0));
+    if (light.picture == 0) {
+        return colours;
+    }
+    LightPicture picture = picture_at(light.picture);
+    PlaneView view = plane_view(light, point.position);
+#if HAS_SPECULAR
+    if (factors.x > 0.0) {
+        colours[0] = picture_average(picture, specular, light, view);
+    }
+#endif
+#if HAS_DIFFUSE
+    if (factors.y > 0.0) {
+        mat3 shading_from_world = transpose(point.world_from_shading);
+        CosineTransform diffuse = CosineTransform(shading_from_world, shading_from_world);
+        colours[1] = picture_average(picture, diffuse, light, view);
+    }
+#endif
+    return colours;
+}
+#endif
+
 // Radiance towards wo. `normal`, `tangent` and `wo` are unit and leave the surface; alpha.x
 // acts along the tangent.
 vec3 shade_lights(
@@ -152,7 +182,13 @@ vec3 shade_lights(
 #else
         vec2 factors = form_factors_at(light, point, specular);
 #endif
+#if HAS_PICTURES
+        mat2x3 colours = seen_pictures(light, point, specular, factors);
+        radiance += light.radiance * (reflectance * factors.x * colours[0] +
+                                      material.diffuse * factors.y * colours[1]);
+#else
         radiance += light.radiance * (reflectance * factors.x + material.diffuse * factors.y);
+#endif
     }
     return radiance;
 }
@@ -177,8 +213,14 @@ void probe_lights(
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
         vec2 factors = form_factors_at(light, point, lobe.transform);
+#if HAS_PICTURES
+        mat2x3 colours = seen_pictures(light, point, lobe.transform, factors);
+        specular += light.radiance * colours[0] * (lobe.albedo.x * factors.x);
+        diffuse += light.radiance * colours[1] * factors.y;
+#else
         specular += light.radiance * (lobe.albedo.x * factors.x);
         diffuse += light.radiance * factors.y;
+#endif
     }
 }
 #endif

@@ -5,6 +5,10 @@
 #include "common/cost.glsl"
 #include "common/light_data.glsl"
 #include "passes/light_storage.glsl"
+#if HAS_PICTURES
+#include "common/light_picture.glsl"
+#include "passes/picture_storage.glsl"
+#endif
 #if HAS_SPECULAR || HAS_DIFFUSE
 #include "passes/material_storage.glsl"
 #include "common/frame.glsl"
@@ -30,13 +34,16 @@ uniform sampler2D history;
 uniform float sample_weight;  // 1 / samples so far, this one included
 #endif
 
-#if HAS_SPECULAR || HAS_DIFFUSE
+#if HAS_SPECULAR || HAS_DIFFUSE || HAS_PICTURES
 uniform vec3 eye;
 // A pixel's ray of unit depth is ray_corner + x ray_dx + y ray_dy, pixels from the
 // bottom left; the sample's offset within the pixel is in ray_corner.
 uniform vec3 ray_corner;
 uniform vec3 ray_dx;
 uniform vec3 ray_dy;
+#endif
+
+#if HAS_SPECULAR || HAS_DIFFUSE
 uniform int light_count;
 #if CULLS
 uniform float faint_radiance;  // that all that is skipped at a point may add up to
@@ -99,6 +106,21 @@ vec3 surface_radiance(vec4 surface)
 }
 #endif
 
+#if HAS_SHAPES && HAS_PICTURES
+// Radiance of a visible light where the pixel sees it.
+vec3 seen_light(int index, float depth)
+{
+    vec3 radiance = light_radiance(index);
+    PlanarLight light = light_at(index);
+    if (light.picture == 0) {
+        return radiance;
+    }
+    vec3 ray = ray_corner + gl_FragCoord.x * ray_dx + gl_FragCoord.y * ray_dy;
+    vec3 at = eye + depth * ray - light.origin;
+    return radiance * sharp_picture(picture_at(light.picture), vec2(dot(at, light.u), dot(at, light.v)));
+}
+#endif
+
 layout(location = 0) out vec4 radiance;
 
 void main()
@@ -110,7 +132,11 @@ void main()
         value.a = 1.0;
 #if HAS_SHAPES
         if (surface.w < 0.0) {
+#if HAS_PICTURES
+            value.rgb = seen_light(-1 - int(surface.w), surface.z);
+#else
             value.rgb = light_radiance(-1 - int(surface.w));
+#endif
         }
 #endif
 #if HAS_SPECULAR || HAS_DIFFUSE

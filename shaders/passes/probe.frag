@@ -1,6 +1,9 @@
 // The lighting pass's own shading at given points, for a white material.
 
 #include "passes/light_storage.glsl"
+#if HAS_PICTURES
+#include "passes/picture_storage.glsl"
+#endif
 #if TECHNIQUE_GGX
 #include "ggx/shade.glsl"
 #elif TECHNIQUE_REFERENCE

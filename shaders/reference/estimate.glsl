@@ -11,6 +11,9 @@
 
 #include "common/light_data.glsl"
 #include "common/light_rectangle.glsl"
+#if HAS_PICTURES
+#include "common/light_picture.glsl"
+#endif
 #include "common/sequence.glsl"
 #include "ltc/plane_view.glsl"
 #include "reference/inside.glsl"
@@ -59,14 +62,14 @@ Estimate begin_estimate(
     return estimate;
 }
 
-// GGX for F = 1, with the weight (1 - wo.h)^5, and the cosine, at one direction and over its
-// density; `light_density` is that of the light's own samples.
-vec3 weighted_terms(Estimate estimate, vec3 wi, float light_density)
+// GGX for F = 1, with the weight (1 - wo.h)^5, the cosine, and Lambert's, at one direction and
+// over its density; `light_density` is that of the light's own samples.
+vec4 weighted_terms(Estimate estimate, vec3 wi, float light_density)
 {
     if (wi.z <= 0.0) {
-        return vec3(0.0);
+        return vec4(0.0);
     }
-    vec3 terms = vec3(0.0);
+    vec4 terms = vec4(0.0, 0.0, 0.0, 0.318309886 * wi.z);
     float density = light_density;
 #if HAS_SPECULAR
     if (estimate.glossy) {
@@ -81,7 +84,7 @@ vec3 weighted_terms(Estimate estimate, vec3 wi, float light_density)
         density += terms.z;
     }
 #endif
-    return density > 0.0 ? terms / density : vec3(0.0);
+    return density > 0.0 ? terms / density : vec4(0.0);
 }
 
 SeenRectangle rectangle_of(PlanarLight light, PlaneView view)
@@ -89,30 +92,32 @@ SeenRectangle rectangle_of(PlanarLight light, PlaneView view)
     return seen_rectangle(light_rectangle(light) - view.foot.xyxy, abs(view.depth));
 }
 
-// The same for a direction that may miss the light.
-vec3 terms_along(Estimate estimate, vec3 wi, PlanarLight light, PlaneView view)
+// The same for a direction that may miss the light; `at` is where it hits.
+vec4 terms_along(Estimate estimate, vec3 wi, PlanarLight light, PlaneView view, out vec2 at)
 {
+    at = vec2(0.0);
     vec3 way = estimate.world_from_tangent * wi;
     float reach = view.depth / dot(way, light.n);
     // Not even a number where the way is along the plane.
     if (wi.z <= 0.0 || !(reach > 0.0)) {
-        return vec3(0.0);
+        return vec4(0.0);
     }
-    vec2 at = view.foot + reach * vec2(dot(way, light.u), dot(way, light.v));
+    at = view.foot + reach * vec2(dot(way, light.u), dot(way, light.v));
     if (!is_on_light(light, at)) {
-        return vec3(0.0);
+        return vec4(0.0);
     }
     return weighted_terms(estimate, wi, rectangle_density(rectangle_of(light, view), reach));
 }
 
 // The same for a place on the light's rectangle.
-vec3 terms_by_place(Estimate estimate, PlanarLight light, PlaneView view)
+vec4 terms_by_place(Estimate estimate, PlanarLight light, PlaneView view, out vec2 at)
 {
     SeenRectangle rectangle = rectangle_of(light, view);
     vec2 random = sequence_point(estimate.seed, LIGHT_PLACE + estimate.light);
     vec2 off = place_on_rectangle(rectangle, random);
-    if (!is_on_light(light, view.foot + off)) {
-        return vec3(0.0);
+    at = view.foot + off;
+    if (!is_on_light(light, at)) {
+        return vec4(0.0);
     }
     vec3 way = view.depth * light.n + off.x * light.u + off.y * light.v;
     float reach = length(way);
@@ -120,24 +125,55 @@ vec3 terms_by_place(Estimate estimate, PlanarLight light, PlaneView view)
                           rectangle_density(rectangle, reach));
 }
 
-// The three of one light; each call is about the next one.
-vec3 light_terms(inout Estimate estimate, PlanarLight light)
+#if HAS_PICTURES
+// Terms in the colours of the light's picture there, a column each.
+mat4x3 coloured_terms(PlanarLight light, vec2 at, vec4 terms)
+{
+    vec3 colour = light.picture == 0 ? vec3(1.0) : sharp_picture(picture_at(light.picture), at);
+    return outerProduct(colour, terms);
+}
+#endif
+
+// The three of one light; each call is about the next one. `seen` is the same in the
+// colours of the light's picture, a column for each term.
+vec4 light_terms(inout Estimate estimate, PlanarLight light
+#if HAS_PICTURES
+    , out mat4x3 seen
+#endif
+    )
 {
     PlaneView view = plane_view(light, estimate.position);
-    vec3 terms = vec3(0.0);
+    vec4 sum = vec4(0.0);
+    vec4 terms;
+    vec2 at;
+#if HAS_PICTURES
+    seen = mat4x3(0.0);
+#endif
     if (light.part_count > 0 && !is_unseen(light, view, estimate.world_from_tangent[2])) {
 #if HAS_SPECULAR
         if (estimate.glossy) {
-            terms += terms_along(estimate, estimate.glossy_way, light, view);
+            terms = terms_along(estimate, estimate.glossy_way, light, view, at);
+            sum += terms;
+#if HAS_PICTURES
+            seen += coloured_terms(light, at, terms);
+#endif
         }
 #endif
 #if HAS_DIFFUSE || TECHNIQUE_RESIDUAL
         if (estimate.has_cosine) {
-            terms += terms_along(estimate, estimate.cosine_way, light, view);
+            terms = terms_along(estimate, estimate.cosine_way, light, view, at);
+            sum += terms;
+#if HAS_PICTURES
+            seen += coloured_terms(light, at, terms);
+#endif
         }
 #endif
-        terms += terms_by_place(estimate, light, view);
+        terms = terms_by_place(estimate, light, view, at);
+        sum += terms;
+#if HAS_PICTURES
+        seen += coloured_terms(light, at, terms);
+#endif
     }
     ++estimate.light;
-    return terms;
+    return sum;
 }

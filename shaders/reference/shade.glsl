@@ -20,9 +20,16 @@ vec3 shade_lights(
     vec3 radiance = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
-        vec3 terms = light_terms(estimate, light);
+#if HAS_PICTURES
+        mat4x3 seen;
+        light_terms(estimate, light, seen);
+        vec3 specular = material.f0 * (seen[0] - seen[1]) + seen[1];
+        radiance += light.radiance * (specular + material.diffuse * seen[2]);
+#else
+        vec4 terms = light_terms(estimate, light);
         vec3 specular = material.f0 * (terms.x - terms.y) + terms.y;
         radiance += light.radiance * (specular + material.diffuse * terms.z);
+#endif
     }
     return radiance;
 }
@@ -41,9 +48,16 @@ void probe_lights(
     diffuse = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
-        vec3 terms = light_terms(estimate, light);
+#if HAS_PICTURES
+        mat4x3 seen;
+        light_terms(estimate, light, seen);
+        specular += light.radiance * seen[0];
+        diffuse += light.radiance * seen[2];
+#else
+        vec4 terms = light_terms(estimate, light);
         specular += light.radiance * terms.x;
         diffuse += light.radiance * terms.z;
+#endif
     }
 }
 #endif

@@ -7,6 +7,9 @@
 
 #include "common/cost.glsl"
 #include "common/light_data.glsl"
+#if HAS_PICTURES
+#include "common/light_picture.glsl"
+#endif
 #include "common/material.glsl"
 #include "common/tangent_frame.glsl"
 #include "ltc/plane_view.glsl"
@@ -116,6 +119,9 @@ vec3 shade_lights(
     vec3 radiance = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
+#if HAS_PICTURES
+        light.radiance *= light.picture > 0 ? mean_picture(picture_at(light.picture)) : vec3(1.0);
+#endif
         PointTerms terms =
             point_terms(light, position, world_from_tangent, wo_tangent, material.alpha);
         vec3 specular =
@@ -137,6 +143,9 @@ void probe_lights(
     diffuse = vec3(0.0);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
+#if HAS_PICTURES
+        light.radiance *= light.picture > 0 ? mean_picture(picture_at(light.picture)) : vec3(1.0);
+#endif
         PointTerms terms = point_terms(light, position, world_from_tangent, wo_tangent, alpha);
         specular += light.radiance * terms.specular.x;
         diffuse += light.radiance * terms.diffuse;

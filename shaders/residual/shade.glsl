@@ -1,7 +1,9 @@
 // Technique `ltc+residual`: what `ltc` says, which has no noise, and an unbiased estimate of
 // what it lacks, GGX minus the fitted lobe, which samples average. The lobe is the very one
 // that `ltc` integrates, as a density, with its reflectance; its light is clipped at the
-// surface's horizon. Lambert is exact already. `seed` is pixel and index of the sample.
+// surface's horizon. Lambert is exact already, but for lights with pictures: of those `ltc` has
+// the form factors exactly and takes one colour for each lobe, so what is estimated besides is how
+// the picture differs from that colour. `seed` is pixel and index of the sample.
 // Twins: ltc.brdf and ltc.transform and, in the mean, ltc.reference.
 
 #include "passes/table_storage.glsl"
@@ -42,17 +44,30 @@ vec3 shade_lights(
     vec3 radiance = shade_lights(light_count, position, normal, wo, material);
     SurfacePoint point = surface_point(position, normal, wo, material.alpha);
 #endif
+#if !HAS_PICTURES
     if (material.f0 == vec3(0.0)) {
         return radiance;
     }
+#endif
     SpecularLobe lobe = specular_lobe(point);
-    vec3 reflectance = material.f0 * (lobe.albedo.x - lobe.albedo.y) + lobe.albedo.y;
+    // As `ltc` has it: f0 = 0 means no specular lobe at all.
+    float has_lobe = material.f0 == vec3(0.0) ? 0.0 : 1.0;
+    vec3 reflectance = material.f0 * (lobe.albedo.x - lobe.albedo.y) + has_lobe * lobe.albedo.y;
     Estimate estimate = begin_residual(seed, point, lobe.transform);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
-        vec3 terms = light_terms(estimate, light);
-        vec3 specular = material.f0 * (terms.x - terms.y) + terms.y;
+#if HAS_PICTURES
+        mat4x3 seen;
+        vec4 terms = light_terms(estimate, light, seen);
+        mat2x3 colours = seen_pictures(light, point, lobe.transform, vec2(1.0));
+        vec3 specular = material.f0 * (seen[0] - seen[1]) + has_lobe * seen[1];
+        radiance += light.radiance * (specular - reflectance * colours[0] * terms.z +
+                                      material.diffuse * (seen[3] - colours[1] * terms.w));
+#else
+        vec4 terms = light_terms(estimate, light);
+        vec3 specular = material.f0 * (terms.x - terms.y) + has_lobe * terms.y;
         radiance += light.radiance * (specular - reflectance * terms.z);
+#endif
     }
     return radiance;
 }
@@ -77,8 +92,16 @@ void probe_lights(
     Estimate estimate = begin_residual(seed, point, lobe.transform);
     for (int i = 0; i < light_count; ++i) {
         PlanarLight light = light_at(i);
-        vec3 terms = light_terms(estimate, light);
+#if HAS_PICTURES
+        mat4x3 seen;
+        vec4 terms = light_terms(estimate, light, seen);
+        mat2x3 colours = seen_pictures(light, point, lobe.transform, vec2(1.0));
+        specular += light.radiance * (seen[0] - lobe.albedo.x * colours[0] * terms.z);
+        diffuse += light.radiance * (seen[3] - colours[1] * terms.w);
+#else
+        vec4 terms = light_terms(estimate, light);
         specular += light.radiance * (terms.x - lobe.albedo.x * terms.z);
+#endif
     }
 }
 #endif

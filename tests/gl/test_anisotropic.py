@@ -30,6 +30,9 @@ from ltc.polygon import loops_form_factor, ltc_specular, positive_winding
 from tests.gl.evaluate import evaluate
 
 FloatArray = NDArray[np.float64]
+OFF = (
+    "COUNTS_EVALUATIONS", "HAS_EXACT_FMA", "HAS_ONE_SIDED", "HAS_PICTURES", "HAS_TWO_SIDED",
+)  # fmt: skip
 COUNT = 2000
 SEAMS = np.radians([0.0, 90.0, 180.0, 270.0])
 
@@ -65,8 +68,7 @@ class TestTwins:
         def run(body, inputs, **keywords):
             includes = ["ltc/anisotropic.glsl"]
             prelude = "vec4 light_texel(int index) { return vec4(0.0); }"
-            names = ("COUNTS_EVALUATIONS", "HAS_EXACT_FMA", "HAS_ONE_SIDED", "HAS_TWO_SIDED")
-            features = dict.fromkeys(names, 0)
+            features = dict.fromkeys(OFF, 0)
             return evaluate(ctx, tmp_path, includes, body, inputs, features, None, prelude,
                             **keywords)  # fmt: skip
 

@@ -86,6 +86,7 @@ FEATURES = {
     "CURVE_RULE": 0,
     "COUNTS_EVALUATIONS": 0,
     "HAS_EXACT_FMA": 0,
+    "HAS_PICTURES": 0,
     "PROBES": 1,
     "CULLS": 0,
     "GGX_NODES": 2,

@@ -27,6 +27,7 @@ FEATURES = {
     "CURVE_RULE": 0,
     "COUNTS_EVALUATIONS": 0,
     "HAS_EXACT_FMA": 0,
+    "HAS_PICTURES": 0,
     "PROBES": 1,
 }
 TWINS = {
@@ -49,6 +50,7 @@ WHOLE = {
     "terms_along",
     "terms_by_place",
     "light_terms",
+    "coloured_terms",
     "cosine_lobe",
     "begin_residual",
     "shade_lights",

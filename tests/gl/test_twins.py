@@ -31,6 +31,7 @@ FEATURES = {
     "CURVE_RULE": 0,
     "COUNTS_EVALUATIONS": 0,
     "HAS_EXACT_FMA": 0,
+    "HAS_PICTURES": 0,
     "PROBES": 1,
     "CULLS": 0,
 }
@@ -62,7 +63,17 @@ TWINS = {
 THROUGH_PROBE = "a stage of the integral, tested whole by test_probe.py"
 THROUGH_CURVES = "a stage of the integral along curves, tested whole by test_curves.py"
 THROUGH_ADAPTIVE = "a stage of the published methods, tested whole by test_adaptive.py"
+THROUGH_PICTURES = "a stage of what lobes see of pictures, tested whole by test_pictures.py"
 GPU_ONLY = {
+    "cosine_plane": THROUGH_PICTURES,
+    "cosine_footprint": THROUGH_PICTURES,
+    "squared_distance": THROUGH_PICTURES,
+    "nearest_place": THROUGH_PICTURES,
+    "footprint_on_light": THROUGH_PICTURES,
+    "cosine_density": THROUGH_PICTURES,
+    "fetched_picture": THROUGH_PICTURES,
+    "picture_average": THROUGH_PICTURES,
+    "seen_pictures": THROUGH_PICTURES,
     "point_at": THROUGH_ADAPTIVE,
     "chord_angle": THROUGH_ADAPTIVE,
     "azimuth_turn": THROUGH_ADAPTIVE,
