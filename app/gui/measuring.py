@@ -9,15 +9,22 @@ exists before somebody asks, and of it only the numbers when it is done.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Generator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import moderngl
 import numpy as np
 
 from app.measure.entries import Entry, entries_of
-from app.measure.errors import Truth, choose_points, exact_truth, lit_evenly, probe_errors
+from app.measure.errors import (
+    choose_points,
+    exact_truth,
+    has_exact_truth,
+    lit_evenly,
+    probe_errors,
+    sampled_truth,
+)
 from app.measure.front import pareto_front
 from app.panels.measurement import MeasuredPoint, Measurement
 from app.render.pack import has_curves
@@ -31,6 +38,9 @@ TECHNIQUES = (
 )  # fmt: skip
 CURVED = ("ltc:2", "adaptive", "uniform")
 """What differs from ``ltc`` in scenes with curves."""
+
+TRUTH_SAMPLES = 2048
+"""Of ``reference`` at a point, where lights have pictures and so no exact integrals."""
 
 POINTS = 96
 REPEATS = 3
@@ -73,8 +83,10 @@ class Measuring:
         """Return what the panel shows beside the picture of a shot."""
         about = ""
         if self._points and self.shot is not None:
-            about = f"At {self._size[0]} × {self._size[1]} pixels, by exact integrals at {POINTS}"
-            about += " pixels for lights of radiance 1 on white."
+            exact = has_exact_truth(self.shot.scene)
+            truth = "exact integrals" if exact else f"{TRUTH_SAMPLES} samples of reference"
+            about = f"At {self._size[0]} × {self._size[1]} pixels, by {truth} at {POINTS} pixels "
+            about += "for lights of radiance 1 on white."
             if self.shot.scene is not shown.scene:
                 about = f"Of an earlier view. {about}"
         return Measurement(self._points, self._doing, self._progress, about)
@@ -153,15 +165,20 @@ class Measuring:
                         found.append(renderer.timings().get("lighting", 0.0))
                 times[entry] = entry.samples * float(np.median(found))
             # Not before: while something is timed nothing else runs.
-            truth = _in_thread(pool, lambda: exact_truth(lit, points, "ggx", on_done=more))
-            while not truth.done():
-                self._doing, self._progress = "integrating exactly", min(done / steps, 1.0)
+            if has_exact_truth(lit):
+                future = pool.submit(lambda: exact_truth(lit, points, "ggx", on_done=more))
+                while not future.done():
+                    self._doing, self._progress = "integrating exactly", min(done / steps, 1.0)
+                    yield
+                truth = future.result()
+            else:
+                self._doing = "sampling the truth"
                 yield
-            exact = truth.result()
+                truth = sampled_truth(renderer, lit, points, TRUTH_SAMPLES)
             for entry in entries:
                 advance(f"comparing {entry}")
                 yield
-                errors = probe_errors(renderer, lit, entry, points, exact)
+                errors = probe_errors(renderer, lit, entry, points, truth)
                 if errors and times[entry] > 0.0:
                     self._add(str(entry), times[entry], errors["specular"].mean)
         finally:
@@ -175,7 +192,3 @@ class Measuring:
         self._points = tuple(
             replace(point, on_front=on) for point, on in zip(points, fronts, strict=True)
         )
-
-
-def _in_thread(pool: ThreadPoolExecutor, work: Callable[[], Truth]) -> Future[Truth]:
-    return pool.submit(work)

@@ -288,6 +288,14 @@ def test_interrupted_with_an_executor(made: Path, monkeypatch: pytest.MonkeyPatc
             assert row["specular_ggx_mean"] == other["specular_ggx_mean"]
 
 
+def test_workers_are_processes(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(made)
+    words = [*SMALL[:-1], "2", *options("ggx:4")]
+    assert run(["report", "disk.json", "-o", "shared", *words]) == 0
+    (row,) = json.loads(Path("shared/results.json").read_text())["rows"]
+    assert row["specular_ggx_mean"] == rows_of(made)["disk", "ggx:4"]["specular_ggx_mean"]
+
+
 class Broken(Executor):
     """One whose workers die."""
 
