@@ -6,7 +6,7 @@ that scenes without pictures have nothing of it.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,9 +38,11 @@ from app.scene import (
 )
 from ltc import transform
 from ltc.bezier import from_polygon
+from ltc.ggx_boundary import Views
 from ltc.prefilter import HALF_SCALE, PAD, Pyramid, prefilter
 from ltc.table import sample_textures
 from ltc.textured import cosine_mean_radiance
+from ltc.textured_reference import CosineLobe, GgxLobe, textured_integrals
 
 FloatArray = NDArray[np.float64]
 
@@ -73,19 +75,24 @@ def scene_of(light: AreaLight) -> Scene:
     return Scene((Material("m"),), (SceneObject("o", "plane", "m"),), (light,))
 
 
-def pyramid_of(laid: LaidPicture) -> tuple[Pyramid, FloatArray, FloatArray]:
-    """Return the library's pyramid of a picture, and corner and size of its rectangle."""
-    assert laid.light.picture is not None
-    corner, size = (
-        laid.corner + laid.size * (PAD / (1.0 + 2.0 * PAD)),
-        laid.size / (1.0 + 2.0 * PAD),
-    )
-    outline = [
+def rectangle_of(laid: LaidPicture) -> tuple[FloatArray, FloatArray]:
+    """Return corner and size of the rectangle around a light, in its own (s, t) [m]."""
+    inner = laid.size / (1.0 + 2.0 * PAD)
+    return laid.corner + PAD * inner, inner
+
+
+def outline_in_rectangle(laid: LaidPicture) -> list[FloatArray]:
+    corner, size = rectangle_of(laid)
+    return [
         ((loop if loop.ndim == 3 else from_polygon(loop)) - corner) / size
         for loop in laid.geometry.loops
     ]
+
+
+def pyramid_of(laid: LaidPicture) -> Pyramid:
+    """Return the library's pyramid of a picture."""
     # Row 0 of a file is the top, v goes up.
-    return prefilter(laid.frame.texels[::-1, :, :3], outline, limit=1024), corner, size
+    return prefilter(laid.frame.texels[::-1, :, :3], outline_in_rectangle(laid), limit=1024)
 
 
 @pytest.fixture
@@ -104,7 +111,7 @@ def test_levels_are_those_of_the_library(atlas, tmp_path, outline):
     assert atlas.update(layout)
     laid = layout.pictures[0]
     texels = atlas.read() / HALF_SCALE * np.array([laid.largest] * 3 + [1.0])
-    pyramid, _, _ = pyramid_of(laid)
+    pyramid = pyramid_of(laid)
     for level, (x, y), (width, height) in zip(
         pyramid.levels, laid.level_corners(), laid.level_sizes(), strict=True
     ):
@@ -114,14 +121,20 @@ def test_levels_are_those_of_the_library(atlas, tmp_path, outline):
         np.testing.assert_allclose(found[..., :3], level[..., :3], rtol=2e-3, atol=4e-3)
 
 
-@pytest.mark.parametrize("outline", [SQUARE, ring()], ids=["square", "ring"])
-def test_lobes_see_what_the_library_says(renderer, tmp_path, outline):
-    """The probe with a picture, over the probe without, against `cosine_mean_radiance`."""
-    light = lamp(smooth_picture(tmp_path / "p.png"), outline)
-    laid = lay_pictures((light,), 0.0, 16384).pictures[0]
-    pyramid, corner, size = pyramid_of(laid)
-    rng = np.random.default_rng(0)
-    n = 3000
+@dataclass(frozen=True)
+class Case:
+    """Points that see a light with a picture, and the light as they see it."""
+
+    inputs: list[FloatArray]
+    """position, normal, tangent, view, alpha: as the probe takes them."""
+    frames: FloatArray
+    """(n, 3, 3): rows o, U, W of the picture's rectangle in the shading frame, x along the view."""
+    wo: FloatArray
+    """(n, 3) in that frame."""
+
+
+def random_case(laid: LaidPicture, seed: int, n: int, alpha: tuple[float, float]) -> Case:
+    rng = np.random.default_rng(seed)
     position = 1.5 * rng.normal(size=(n, 3))
     position[:, 2] = np.exp(rng.uniform(np.log(0.1), np.log(6.0), n))
     target = np.concatenate([0.6 * rng.normal(size=(n, 2)), np.zeros((n, 1))], axis=1)
@@ -129,32 +142,70 @@ def test_lobes_see_what_the_library_says(renderer, tmp_path, outline):
     theta = np.radians(rng.uniform(0.0, 85.0, n))[:, None]
     normal = unit(np.cos(theta) * way + np.sin(theta) * unit(np.cross(way, rng.normal(size=3))))
     view = 2.0 * np.sum(normal * way, axis=-1, keepdims=True) * normal - way
-    alpha = np.exp(rng.uniform(np.log(0.01), 0.0, n))
+    a = np.exp(rng.uniform(*np.log(alpha), n))
+    tangent = unit(np.cross(normal, [0.3, 0.5, 0.1]))
     inputs = [
         values.astype(np.float32).astype(np.float64)
-        for values in (
-            position, normal, unit(np.cross(normal, [0.3, 0.5, 0.1])), view,
-            np.stack([alpha, alpha], axis=-1),
-        )
-    ]  # fmt: skip
-    seen = renderer.probe(Scene(lights=(light,)), RenderSettings("ltc"), *inputs)
-    plain = renderer.probe(
-        Scene(lights=(replace(light, picture=None),)), RenderSettings("ltc"), *inputs
-    )
+        for values in (position, normal, tangent, view, np.stack([a, a], axis=-1))
+    ]
     position, normal, view = inputs[0], unit(inputs[1]), unit(inputs[3])
     frame = shading_frames(normal, view)
-    cosine = np.clip(np.sum(normal * view, axis=-1), 0.0, 1.0)
-    M, _, _ = sample_textures(isotropic_textures(), inputs[4][:, 0], cosine)
+    corner, size = rectangle_of(laid)
     basis = np.stack([laid.geometry.u, laid.geometry.v])
     origin = laid.geometry.origin + corner @ basis - position
     axes = np.broadcast_to(size[:, None] * basis, (n, 2, 3))
-    rows = np.einsum("nij,nkj->nki", frame, np.concatenate([origin[:, None], axes], axis=1))
-    in_cosine = np.einsum("nij,nkj->nki", transform.invert(M), rows)
-    for lobe, frames in (("specular", in_cosine), ("diffuse", rows)):
+    rows = np.concatenate([origin[:, None], axes], axis=1)
+    return Case(
+        inputs, np.einsum("nij,nkj->nki", frame, rows), np.einsum("nij,nj->ni", frame, view)
+    )
+
+
+@pytest.mark.parametrize("outline", [SQUARE, ring()], ids=["square", "ring"])
+def test_lobes_see_what_the_library_says(renderer, tmp_path, outline):
+    """The probe with a picture, over the probe without, against `cosine_mean_radiance`."""
+    light = lamp(smooth_picture(tmp_path / "p.png"), outline)
+    laid = lay_pictures((light,), 0.0, 16384).pictures[0]
+    pyramid = pyramid_of(laid)
+    case = random_case(laid, 0, 3000, (0.01, 1.0))
+    seen = renderer.probe(Scene(lights=(light,)), RenderSettings("ltc"), *case.inputs)
+    plain = renderer.probe(
+        Scene(lights=(replace(light, picture=None),)), RenderSettings("ltc"), *case.inputs
+    )
+    M, _, _ = sample_textures(isotropic_textures(), case.inputs[4][:, 0], case.wo[:, 2])
+    in_cosine = np.einsum("nij,nkj->nki", transform.invert(M), case.frames)
+    for lobe, frames in (("specular", in_cosine), ("diffuse", case.frames)):
         error = np.abs(seen[lobe] - plain[lobe] * cosine_mean_radiance(pyramid, frames, TAPS))
         assert np.mean(error) <= 2e-4
         assert np.quantile(error, 0.99) <= 2e-3
         assert np.max(error) <= 1e-2
+
+
+@pytest.mark.parametrize("technique", ["reference", "ltc+residual"])
+@pytest.mark.parametrize("outline", [SQUARE, ring()], ids=["square", "ring"])
+def test_samples_converge_to_exact_integrals(renderer, tmp_path, technique, outline):
+    """Of the very picture, bilinear: 24 points, 64 independent means of 64 samples each."""
+    light = lamp(smooth_picture(tmp_path / "p.png", 24, 16), outline)
+    laid = lay_pictures((light,), 0.0, 16384).pictures[0]
+    case = random_case(laid, 1, 24, (0.05, 1.0))
+    picture = laid.frame.texels[::-1, :, :3]
+    alpha = case.inputs[4][:, 0]
+    outline_in = outline_in_rectangle(laid)
+    lobes = {
+        "specular": GgxLobe(Views(case.wo, alpha, alpha)),
+        "diffuse": CosineLobe.diffuse(len(alpha)),
+    }
+    front = np.sum(case.inputs[0] * np.cross(laid.geometry.u, laid.geometry.v), axis=-1) > 0.0
+    replicas = 64
+    repeated = [np.tile(values, (replicas, 1)) for values in case.inputs]
+    found = renderer.probe(Scene(lights=(light,)), RenderSettings(technique, 64), *repeated)
+    for name, lobe in lobes.items():
+        exact = textured_integrals(picture, outline_in, case.frames, lobe).value * front[:, None]
+        means = found[name].reshape(replicas, -1, 3).astype(np.float64)
+        error = np.maximum(means.std(axis=0, ddof=1) / np.sqrt(replicas), 3e-5)
+        z = (means.mean(axis=0) - exact) / error
+        # 72 numbers, of which three colours share their samples.
+        assert np.max(np.abs(z)) <= 4.5, name
+        assert np.mean(z**2) <= 2.0, name
 
 
 @pytest.mark.parametrize("technique", ["ltc", "ggx"])
