@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from app import contours
 from app.lights import bounds_of, move_light, regular_polygon
+from app.pictures import picture_size
 from app.presets import PRESETS
 from app.scene import (
     AreaLight,
@@ -24,7 +25,9 @@ from app.scene import (
     Material,
     Outline,
     OutlineSource,
+    Picture,
     Plane,
+    PolygonContour,
     Scene,
     SceneObject,
     SvgSource,
@@ -135,6 +138,22 @@ def add_preset(scene: Scene, name: str) -> tuple[Scene, int]:
         contours.transform(contour, factor * np.eye(2), shift) for contour in outline.contours
     )
     return add_light(scene, replace(outline, contours=fitted), name.lower())
+
+
+def add_picture(scene: Scene, picture: Picture) -> tuple[Scene, int]:
+    """Add a rectangular light with a picture and of its shape; return its index.
+
+    Raises
+    ------
+    InputError
+        If the picture's size cannot be read.
+    """
+    columns, rows = picture_size(picture)
+    texel = 0.5 * new_size(scene.camera) / max(columns, rows)
+    s, t = columns * texel, rows * texel
+    outline = Outline((PolygonContour(((-s, -t), (s, -t), (s, t), (-s, t))),))
+    scene, index = add_light(scene, outline, Path(picture.file).stem)
+    return replace_light(scene, index, replace(scene.lights[index], picture=picture)), index
 
 
 def add_text(scene: Scene, text: str = "Light", font: str = "") -> tuple[Scene, int]:

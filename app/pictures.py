@@ -89,8 +89,8 @@ def load_frame(picture: Picture, time: float) -> PictureTexels:
         If the file is missing, unreadable, of another kind or damaged, or has a side of more
         than `app.picture_files.LARGEST_FILE_SIDE`.
     """
-    path, frame = _frame_at(picture, time)
-    return _frames(str(path), *_state(path), frame, picture.color_space)
+    path, frame = frame_at(picture, time)
+    return _frames(path, *_state(Path(path)), frame, picture.color_space)
 
 
 def picture_size(picture: Picture) -> tuple[int, int]:
@@ -103,6 +103,25 @@ def picture_size(picture: Picture) -> tuple[int, int]:
     """
     path = _files(picture.file)[0]
     return read_size(str(path), *_state(path))
+
+
+def frame_at(picture: Picture, time: float) -> tuple[str, int]:
+    """Return the file that is shown at a moment [s], and which of its frames.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or damaged.
+    """
+    files = _files(picture.file)
+    ends = _frame_ends(picture)
+    frame = 0
+    if len(ends) > 1:
+        # What is a frame's first moment but for rounding is that frame's already.
+        moment = math.fmod(time + picture.start + 1e-6, ends[-1])
+        moment += ends[-1] if moment < 0.0 else 0.0
+        frame = min(bisect_right(ends, moment), len(ends) - 1)
+    return (str(files[frame]), 0) if len(files) > 1 else (str(files[0]), frame)
 
 
 def duration(picture: Picture) -> float:
@@ -209,19 +228,6 @@ def _fitted(picture: Picture, width: float, height: float) -> tuple[float, float
 
 
 # Which frame
-
-
-def _frame_at(picture: Picture, time: float) -> tuple[Path, int]:
-    """Return the file and the frame in it that is shown at a moment."""
-    files = _files(picture.file)
-    ends = _frame_ends(picture)
-    frame = 0
-    if len(ends) > 1:
-        # What is a frame's first moment but for rounding is that frame's already.
-        moment = math.fmod(time + picture.start + 1e-6, ends[-1])
-        moment += ends[-1] if moment < 0.0 else 0.0
-        frame = min(bisect_right(ends, moment), len(ends) - 1)
-    return (files[frame], 0) if len(files) > 1 else (files[0], frame)
 
 
 def _frame_ends(picture: Picture) -> tuple[float, ...]:

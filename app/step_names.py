@@ -25,6 +25,13 @@ _FIELD_NAMES = {
     "line_height": "line height",
     "path": "drawing",
 }
+_PICTURE_NAMES = {
+    "color_space": "colours",
+    "offset": "position",
+    "scale": "size",
+    "mirror": "mirroring",
+    "frames_per_second": "speed",
+}
 
 
 def describe(before: Scene, after: Scene) -> str:
@@ -46,6 +53,13 @@ def describe(before: Scene, after: Scene) -> str:
             if isinstance(a, AreaLight) and isinstance(b, AreaLight):
                 if b.source is not None and (a.source, a.outline) != (b.source, b.outline):
                     return _change_of_source(a, b)
+                if (a.picture is None) != (b.picture is None):
+                    way = "Remove picture of" if b.picture is None else "Put picture on"
+                    return f"{way} '{a.name}'"
+                if a.picture != b.picture:
+                    changed = _first_difference(a.picture, b.picture)
+                    changed = _PICTURE_NAMES.get(changed, changed)
+                    return f"Change {changed} of the picture on '{a.name}'"
                 more = len(b.outline.contours) - len(a.outline.contours)
                 if more:
                     return f"{'Add' if more > 0 else 'Remove'} outline of '{a.name}'"

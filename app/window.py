@@ -98,6 +98,7 @@ class Window:
         self.editor.selection = first_selection(scene)
         self.messages.clear()
         self._panels.begin(scene)
+        self.viewport.playback.begin()
         self.lobe.begin()
 
     # --- set-up -------------------------------------------------------------------
@@ -119,7 +120,7 @@ class Window:
         windows: dict[str, Callable[[], None]] = {
             "Viewport": self._viewport_window,
             "Scene": self._panels.scene,
-            "Light": self._panels.light,
+            "Light": lambda: self._panels.light(self.viewport.playback),
             "Lobe": self._lobe_window,
             "Material": lambda: self._panels.material(self.viewport.settings),
             "Object": self._panels.object,
@@ -218,7 +219,7 @@ class Window:
         with self.messages.guard():
             self.measuring.step(self.renderer.ctx)
         works = (self.measuring, self.inspector, self.exports)
-        is_busy = any(work.is_busy for work in works)
+        is_busy = any(work.is_busy for work in works) or self.viewport.playback.is_moving
         if is_busy or not (self.viewport.is_idle and self.lobe.is_settled):
             hello_imgui.request_refresh()
 

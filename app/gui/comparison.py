@@ -173,6 +173,11 @@ class Comparison:
         """Switch the comparison off, or on as a split view."""
         self.form = self.form.toggled()
 
+    def begin_again(self) -> None:
+        """Render B anew: a file that the scene names has changed."""
+        if self._side is not None:
+            self._side.picture.begin_again()
+
     def flip(self) -> None:
         """Show B, or A again."""
         self.form = self.form.flipped()

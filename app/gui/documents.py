@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias
 
 from app.editor import Editor
 from app.gui.beginning import new_scene
-from app.gui.file_types import DRAWING_FILES, SCENE_FILES, FileChooser
+from app.gui.file_types import DRAWING_FILES, LIGHT_PICTURES, SCENE_FILES, FileChooser
 from app.gui.imports import Imports
 from app.gui.messages import Messages
 from app.meshes import MESH_SUFFIXES
@@ -141,13 +141,24 @@ class Documents:
     # --- dropped files --------------------------------------------------------
 
     def drop(self, names: Sequence[str]) -> None:
-        """Open dropped scenes, add dropped meshes, drawings and fonts."""
+        """Open dropped scenes, add dropped meshes, drawings, fonts and pictures.
+
+        Of several pictures the first goes on the selected light, each other on a new one.
+        """
+        pictures = 0
         for path in map(Path, names):
+            if path.suffix.lower() in LIGHT_PICTURES[1]:
+                pictures += 1
+                if pictures > 1:
+                    self._imports.add_picture(path)
+                    continue
             if path.suffix.lower() == ".json":
                 self.open(path)
             elif not self._imports.take(path):
-                kinds = ", ".join((*MESH_SUFFIXES, *DRAWING_FILES[1], *font_suffixes()))
+                kinds = ", ".join(
+                    (*MESH_SUFFIXES, *DRAWING_FILES[1], *font_suffixes(), *LIGHT_PICTURES[1])
+                )
                 self._messages.failure(
                     f"{path.name}: found '{path.suffix}', expected a scene (.json), or a mesh, "
-                    f"a drawing or a font ({kinds})"
+                    f"a drawing, a font or a picture ({kinds})"
                 )

@@ -90,7 +90,8 @@ class Exports:
     def start(self, path: Path, export: Export | None = None) -> None:
         """Start to render a picture file, as the dialog says unless told; see `is_busy`."""
         with self._messages.guard():
-            shot = shot_of(self._editor.scene, self._viewport.settings, export or self.form)
+            scene = self._viewport.playback.readable(self._editor.scene)
+            shot = shot_of(scene, self._viewport.settings, export or self.form)
             self._job = Job(path, shot, Renderer(self._renderer.ctx))
 
     def draw(self) -> None:

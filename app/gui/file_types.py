@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
+from app.picture_files import PICTURE_SUFFIXES
 from app.sources import font_suffixes
 
 FileType: TypeAlias = tuple[str, tuple[str, ...]]
@@ -13,6 +14,7 @@ FileType: TypeAlias = tuple[str, tuple[str, ...]]
 
 SCENE_FILES: FileType = ("Scenes", (".json",))
 DRAWING_FILES: FileType = ("Drawings", (".svg",))
+LIGHT_PICTURES: FileType = ("Pictures", PICTURE_SUFFIXES)
 
 
 def font_files() -> FileType:

@@ -1,19 +1,21 @@
-"""Files that become part of the scene: meshes, drawings and fonts, dropped or chosen.
+"""Files that become part of the scene: meshes, drawings, fonts, pictures, dropped or chosen.
 
 Free of the GUI, as `app.gui.documents` is, which owns the scene's own file.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from app import edits, step_names
 from app.editor import Editor, Selection
-from app.gui.file_types import DRAWING_FILES, FileChooser, font_files
+from app.gui.file_types import DRAWING_FILES, LIGHT_PICTURES, FileChooser, font_files
 from app.gui.messages import Messages
 from app.meshes import MESH_SUFFIXES, load_mesh
-from app.scene import AreaLight, OutlineSource, Scene, SvgSource, TextSource, Transform
+from app.pictures import load_frame
+from app.scene import AreaLight, OutlineSource, Picture, Scene, SvgSource, TextSource, Transform
 from app.sources import font_suffixes, left_out, remade
 
 
@@ -42,6 +44,8 @@ class Imports:
             self.add_mesh(path)
         elif suffix in DRAWING_FILES[1]:
             self.add_drawing(path)
+        elif suffix in LIGHT_PICTURES[1]:
+            self.use_picture(path)
         elif suffix in font_suffixes():
             self.use_font(path)
         else:
@@ -90,6 +94,47 @@ class Imports:
         else:
             self.add_text(str(path.resolve()))
 
+    def use_picture(self, path: Path) -> None:
+        """Put a picture file on the selected light; without one, add a light of its shape."""
+        light = self._editor.selected_light
+        if light is not None:
+            self._put_picture(light, path)
+        else:
+            self.add_picture(path)
+
+    def add_picture(self, path: Path) -> None:
+        """Add a light that has the shape of a picture file, with the picture."""
+        with self._messages.guard():
+            picture = Picture(str(path.resolve()))
+            load_frame(picture, 0.0)  # one that cannot be read changes nothing
+            self._add_light(*edits.add_picture(self._editor.scene, picture))
+
+    def ask_picture(self, light: AreaLight | None = None) -> None:
+        """Ask for a picture file for a light, or for a new one."""
+        folder = self._folder(light.picture.file if light is not None and light.picture else "")
+        if light is None:
+            self._chooser.ask_open(
+                "Add a picture as a light", LIGHT_PICTURES, folder, self.add_picture
+            )
+        else:
+            self._chooser.ask_open(
+                f"Choose a picture for '{light.name}'", LIGHT_PICTURES, folder,
+                lambda path: self._put_picture(light, path),
+            )  # fmt: skip
+
+    def _put_picture(self, light: AreaLight, path: Path) -> None:
+        """Put a picture on a light, placed as the one before it."""
+        with self._messages.guard():
+            picture = Picture(str(path.resolve()))
+            load_frame(picture, 0.0)
+            self._change(
+                light,
+                lambda old: replace(
+                    old,
+                    picture=replace(old.picture, file=picture.file) if old.picture else picture,
+                ),
+            )
+
     def ask_source(self, light: AreaLight) -> None:
         """Ask for another font or drawing for a light that was made from one."""
         source = light.source
@@ -111,14 +156,18 @@ class Imports:
         self._editor.selection = Selection.light(index)
 
     def _make_again(self, light: AreaLight, source: OutlineSource) -> None:
-        """Make a light, found by its name, from another source."""
+        """Make a light from another source."""
         with self._messages.guard():
-            before = self._editor.scene
-            names = [other.name for other in before.lights]
-            if light.name in names:
-                index = names.index(light.name)
-                after = edits.replace_light(before, index, remade(before.lights[index], source))
-                self._editor.apply(step_names.describe(before, after), after)
+            self._change(light, lambda old: remade(old, source))
+
+    def _change(self, light: AreaLight, change: Callable[[AreaLight], AreaLight]) -> None:
+        """Change a light, found by its name, if it is still there."""
+        before = self._editor.scene
+        names = [other.name for other in before.lights]
+        if light.name in names:
+            index = names.index(light.name)
+            after = edits.replace_light(before, index, change(before.lights[index]))
+            self._editor.apply(step_names.describe(before, after), after)
 
     def _folder(self, beside: str = "") -> Path:
         """Return where to begin looking for a file: beside another one, else beside the scene."""

@@ -69,7 +69,7 @@ class LivePicture:
         self.history: deque[float] = deque(maxlen=120)
         self._renderer = renderer
         self._reporter = reporter
-        self._wanted: Scene | None = None
+        self._wanted: tuple[Scene, float] | None = None
         self._shown: tuple[Scene, Camera, Scene] | None = None
         self._failed: Shot | None = None
         self._full_size_seconds = 0.0
@@ -113,9 +113,10 @@ class LivePicture:
         now = time.monotonic()
         if _is_touched():
             self._touched_at = now
-        if self._wanted is None or _other_radiance(self._wanted, scene):
+        wanted = self._wanted
+        if wanted is None or wanted[1] != settings.time or _other_radiance(wanted[0], scene):
             self._changed_at = now
-        self._wanted = scene
+        self._wanted = (scene, settings.time)
         patience = min(max(SETTLE, self._full_size_seconds), LONGEST_SETTLE)
         moving = now - self._changed_at < patience
         width, height = pixels
@@ -151,6 +152,11 @@ class LivePicture:
         # The GPU's figures are those of the sample before, the size of which counts.
         self._full_size_seconds = seconds + gpu * self._divisor**2
         self._divisor = divisor
+
+    def begin_again(self) -> None:
+        """Render everything anew: a file that the scene names has changed."""
+        self._failed, self.samples = None, (0, self.samples[1])
+        self._renderer.begin_again()
 
     def draw(self, view: View) -> None:
         """Draw the picture, or its absence, into the current Dear ImGui window."""

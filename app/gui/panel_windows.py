@@ -15,16 +15,18 @@ from app.gui.beginning import first_material
 from app.gui.comparison import Comparison
 from app.gui.imports import Imports
 from app.gui.live_picture import LivePicture
+from app.gui.playback import Playback
 from app.gui.summaries import view_parts
 from app.panels.camera import camera_panel
 from app.panels.compare import compare_panel
 from app.panels.display import display_panel
 from app.panels.light import light_panel, rename_field
 from app.panels.material import material_panel, object_panel
+from app.panels.picture import Player
 from app.panels.scene_tree import scene_panel
 from app.panels.widgets import button, hint, name_field
 from app.render.techniques import AUTOMATIC, TECHNIQUES, find_technique, suited_technique
-from app.scene import Material, RenderSettings, Scene, SceneObject, TextSource
+from app.scene import AreaLight, Material, RenderSettings, Scene, SceneObject, TextSource
 
 MEASURES = ("reference", "ggx:4", "ltc:6")
 """What to compare with first: what is exact, or nearly, in the limit or at once."""
@@ -56,7 +58,9 @@ class PanelWindows:
     def scene(self) -> None:
         """Draw the list of everything."""
         editor = self._editor
-        scene, selection = scene_panel(editor.scene, editor.selection, self._imports.ask_drawing)
+        scene, selection = scene_panel(
+            editor.scene, editor.selection, self._imports.ask_drawing, self._imports.ask_picture
+        )
         if len(scene.lights) > len(editor.scene.lights):
             self._is_new_text = selection.kind == "light" and isinstance(
                 scene.lights[selection.index].source, TextSource
@@ -64,8 +68,8 @@ class PanelWindows:
         self._stage(scene)
         editor.selection = selection
 
-    def light(self) -> None:
-        """Draw the panel of the light that was selected last."""
+    def light(self, playback: Playback) -> None:
+        """Draw the panel of the light that was selected last; ``playback`` plays its picture."""
         scene, selection = self._editor.scene, self._editor.selection
         if not scene.lights:
             hint("The scene has no light. Add one with + in the Scene panel.")
@@ -79,9 +83,24 @@ class PanelWindows:
         focus, self._is_new_text = self._is_new_text, False
         new = light_panel(
             light, selection.vertex if chosen else None, scene.camera.target,
-            lambda: self._imports.ask_source(light), focus,
+            lambda: self._imports.ask_source(light), focus, self._player(light, playback),
         )  # fmt: skip
         self._stage(edits.replace_light(scene, index, new) if new != light else named)
+
+    def _player(self, light: AreaLight, playback: Playback) -> Player:
+        picture = light.picture
+        seconds = playback.seconds(picture) if picture is not None else 0.0
+
+        def ask_file() -> None:
+            self._imports.ask_picture(light)
+
+        if picture is None or seconds == 0.0:
+            return Player(ask_file=ask_file)
+        start = picture.start
+        return Player(
+            seconds, (playback.time + start) % seconds, playback.is_playing, ask_file,
+            playback.toggle, lambda moment: playback.seek(moment - start),
+        )  # fmt: skip
 
     def material(self, settings: RenderSettings) -> None:
         """Draw the panel of the material that was selected last."""

@@ -28,6 +28,7 @@ from app.gui.messages import Messages
 from app.gui.outline_tool import OutlineTool, Spot
 from app.gui.overlays import Canvas, Sight, View, help_line
 from app.gui.placement import box_corners, moved_by, name_of, pose_of, sphere_around
+from app.gui.playback import Playback
 from app.render import cost
 from app.render.picking import Hit
 from app.render.renderer import Renderer
@@ -77,6 +78,7 @@ class Viewport:
         self.view = View(0.0, 0.0, 1.0, 1.0, (1, 1))
         self.picture = LivePicture(renderer, messages)
         self.comparison = Comparison(renderer, messages)
+        self.playback = Playback(messages)
         self.outline = OutlineTool(messages)
         self._renderer = renderer
         self._messages = messages
@@ -137,7 +139,7 @@ class Viewport:
             self.outline.let_go()
         self.comparison.divide(self.view)
         self._canvas(editor)
-        self._picture(editor.scene)
+        self._picture(self._played(editor.scene))
         if self.comparison.shows_cost(self.settings):
             draw_legend(self.view, cost.LEGEND)
         self._is_asking = False
@@ -145,6 +147,17 @@ class Viewport:
             self._overlays(editor)
             self._manipulate(editor)
             help_line(self.view, self.help)
+
+    def _played(self, scene: Scene) -> Scene:
+        """Let pictures on lights play and change, and return the scene as it can be shown."""
+        changes = self.playback.changes
+        scene = self.playback.step(scene, time.monotonic())
+        if self.playback.time != self.settings.time:
+            self.settings = replace(self.settings, time=self.playback.time)
+        if self.playback.changes != changes:
+            self.picture.begin_again()
+            self.comparison.begin_again()
+        return scene
 
     def _picture(self, scene: Scene) -> None:
         """Render what is missing of the picture, or of both that are compared, and draw it."""

@@ -1,4 +1,4 @@
-"""The panel of one light: its radiance, its shape and where it is."""
+"""The panel of one light: its radiance, its picture, its shape and where it is."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from app import contours, lights, planes
+from app.panels.picture import Player, picture_rows
 from app.panels.source import source_rows
 from app.panels.widgets import (
     button,
@@ -37,6 +38,7 @@ from app.scene import (
 from app.vectors import add, cross, length, normalize, scale, subtract
 
 RADIANCE_MAX = 1000.0
+NO_PLAYER = Player()
 
 
 def light_panel(
@@ -45,6 +47,7 @@ def light_panel(
     target: Vec3 = (0.0, 0.0, 0.0),
     ask_file: Callable[[], None] = lambda: None,
     focus_text: bool = False,
+    player: Player = NO_PLAYER,
 ) -> AreaLight:
     """Draw the panel and return the light as edited.
 
@@ -58,6 +61,8 @@ def light_panel(
         Asks for another font or drawing for a light that is made from one.
     focus_text : bool
         Put the keyboard into the text of a text light.
+    player : Player
+        What the light's picture does, and what can be asked for.
 
     Raises
     ------
@@ -65,7 +70,7 @@ def light_panel(
         If the light cannot do what a control asks for, after drawing.
     """
     with identity(f"light {light.name}"):
-        new = _emission(light)
+        new = picture_rows(_emission(light), player)
         new, failed_source = source_rows(new, ask_file, focus_text)
         new, failed_shape = _shape(new, vertex)
         new, failed_aim = _placement(new, target)

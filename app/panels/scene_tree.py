@@ -17,17 +17,20 @@ from app.sliders import srgb_from_linear
 
 
 def scene_panel(
-    scene: Scene, selection: Selection, ask_drawing: Callable[[], None] = lambda: None
+    scene: Scene,
+    selection: Selection,
+    ask_drawing: Callable[[], None] = lambda: None,
+    ask_picture: Callable[[], None] = lambda: None,
 ) -> tuple[Scene, Selection]:
     """Draw the tree; return the scene as edited and what is selected now.
 
-    ``ask_drawing`` asks for an SVG file to add as a light.
+    ``ask_drawing`` asks for an SVG file to add as a light, ``ask_picture`` for a picture.
     """
     new, chosen = scene, selection
     if _section("Lights", "Add a light above what you look at", "add light"):
         imgui.open_popup("shapes")
     if imgui.begin_popup("shapes"):
-        new, index = _new_light(new, ask_drawing)
+        new, index = _new_light(new, ask_drawing, ask_picture)
         chosen = Selection.light(index) if index is not None else chosen
         imgui.end_popup()
     if not scene.lights:
@@ -54,7 +57,9 @@ def scene_panel(
     return new, chosen
 
 
-def _new_light(scene: Scene, ask_drawing: Callable[[], None]) -> tuple[Scene, int | None]:
+def _new_light(
+    scene: Scene, ask_drawing: Callable[[], None], ask_picture: Callable[[], None]
+) -> tuple[Scene, int | None]:
     """Draw the menu of shapes; return the scene and the index of the light if one was added."""
     if imgui.menu_item_simple("Square"):
         return edits.add_light(scene)
@@ -66,6 +71,8 @@ def _new_light(scene: Scene, ask_drawing: Callable[[], None]) -> tuple[Scene, in
         return edits.add_text(scene)
     if imgui.menu_item_simple("SVG…###new drawing"):
         ask_drawing()
+    if imgui.menu_item_simple("Picture…###new picture"):
+        ask_picture()
     return scene, None
 
 

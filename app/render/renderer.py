@@ -556,6 +556,10 @@ class Renderer:
             self._displayed = None
         return changed
 
+    def begin_again(self) -> None:
+        """Start afresh with the next sample: a picture that the scene names has changed."""
+        self._stale = True
+
     def release(self) -> None:
         """Release every GPU object. The renderer cannot be used afterwards."""
         self._targets.release()

@@ -21,7 +21,7 @@ PURE = {
     "app.images", "app.vectors", "app.edits", "app.editor", "app.sliders", "app.camera_control",
     "app.lights", "app.planes", "app.contours", "app.sources", "app.step_names", "app.gui.messages",
     "app.gui.shortcuts", "app.gui.beginning", "app.gui.documents", "app.gui.imports",
-    "app.gui.file_types",
+    "app.gui.file_types", "app.gui.playback",
     "app.loops", "app.text", "app.text_runs", "app.svg", "app.svg_paths", "app.svg_tree",
     "app.json_reader", "app.json_writer", "app.light_io", "app.plan_rows",
     "app.colour_maps", "app.lobe_picture", "app.lobe_figure",

@@ -41,7 +41,7 @@ from app.scene import (
     Transform,
 )
 from app.scene_io import load_scene
-from tests.gui import comparing, lobes, measuring, outlines
+from tests.gui import comparing, lobes, measuring, outlines, picturing
 from tests.gui.application import Application
 
 CTRL, SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
@@ -651,6 +651,7 @@ SCENARIOS = (
     *comparing.SCENARIOS,
     *lobes.SCENARIOS,
     *measuring.SCENARIOS,
+    *picturing.SCENARIOS,
 )
 
 

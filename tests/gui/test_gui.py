@@ -65,6 +65,11 @@ SCENARIOS = (
     "lobe_by_hand",
     "measure_the_techniques",
     "stop_measuring",
+    "drop_pictures",
+    "place_a_picture",
+    "play_a_picture",
+    "pictures_change_and_go_missing",
+    "a_scene_without_its_picture",
 )
 
 pytestmark = pytest.mark.skipif(
