@@ -16,7 +16,6 @@ from app.panels.widgets import (
     choice,
     half_width,
     heading,
-    hint,
     label,
     numbers,
     slider,
@@ -63,9 +62,9 @@ def picture_rows(light: AreaLight, player: Player) -> AreaLight:
     heading("Picture")
     picture = light.picture
     if picture is None:
-        if button("Choose…###choose picture", "Put a picture on the light", width=-1.0):
+        tip = "Put a picture on the light; dropping one on the window does so too"
+        if button("Choose…###choose picture", tip, width=-1.0):
             player.ask_file()
-        hint("Or drop one on the window.")
         return light
     label("File", picture.file)
     imgui.text_colored(MUTED, Path(picture.file).name)

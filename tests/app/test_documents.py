@@ -125,8 +125,9 @@ def test_dropped_files_are_opened_added_or_refused(desk: Desk, tmp_path: Path) -
     assert item.transform.scale == pytest.approx((0.01, 0.01, 0.01))
     assert item.transform.translate == pytest.approx((0.0, -0.02, 0.0)), "it stands on the ground"
     assert desk.said == [
-        "notes.txt: found '.txt', expected a scene (.json), or a mesh, a drawing or a font (.glb, "
-        ".gltf, .obj, .ply, .stl, .svg, .ttf, .otf, .ttc, .otc, .woff, .woff2)"
+        "notes.txt: found '.txt', expected a scene (.json), or a mesh, a drawing, a font or a "
+        "picture (.glb, .gltf, .obj, .ply, .stl, .svg, .ttf, .otf, .ttc, .otc, .woff, .woff2, "
+        ".png, .jpg, .jpeg, .webp, .gif, .tif, .tiff, .exr, .hdr)"
     ]
 
 

@@ -57,7 +57,7 @@ def test_time_is_that_of_the_last_new_frame(tmp_path: Path, playback: Playback) 
     assert not playback.is_moving
     playback.toggle()
     playback.step(scene, 200.11)
-    assert playback.time == pytest.approx(seen[-1] + 0.11, abs=0.0101), "no jump over the pause"
+    assert playback.time == pytest.approx(0.39 + 0.11), "no jump over the pause"
     playback.seek(0.25)
     assert (playback.time, playback.is_playing) == (0.25, False)
 
@@ -133,6 +133,4 @@ def test_steps_of_the_history_have_names() -> None:
         ("frames_per_second", 5.0, "speed"), ("start", 1.0, "start"),
     ):  # fmt: skip
         changed = scene_of(replace(picture, **{field: value}))
-        assert (
-            step_names.describe(after, changed) == f"Change {name} of the picture on 'light 0'"
-        )
+        assert step_names.describe(after, changed) == f"Change {name} of the picture on 'light 0'"

@@ -464,7 +464,7 @@ def idle_when_nothing_changes(app: Application, out: Path) -> None:
     app.enter("##exposure", 1.0)
     app.settle()
     assert app.window.renderer.lighting_passes == passes, "exposure needs no lighting"
-    app.enter("##radiance", 2.0)
+    app.act(lambda ctx: ctx.item_input_value("//Light/light key/##radiance", 2.0))
     app.settle()
     assert app.window.renderer.lighting_passes > passes
 
