@@ -307,14 +307,19 @@ def _load(path: str, changed: int, size: int, frame: int, color_space: ColorSpac
     rows, columns = decoded.pixels.shape[:2]
     shrink = min(1.0, LARGEST_SIDE / max(rows, columns))
     shape = max(1, round(rows * shrink)), max(1, round(columns * shrink))
-    texels = np.zeros((rows, shape[1], 4), dtype=np.float32)
-    endless = negative = 0
-    for begin in range(0, rows, ROWS_AT_ONCE):
-        band = decoded.pixels[begin : begin + ROWS_AT_ONCE]
-        linear, bad, below = _linear(band, is_srgb, decoded.is_associated)
-        endless, negative = endless + bad, negative + below
-        texels[begin : begin + ROWS_AT_ONCE] = _averaged(linear, shape[1], 1)
-    texels = _averaged(texels, shape[0], 0)
+    texels = np.empty((*shape, 4), dtype=np.float32)
+    down, across = (np.linspace(0.0, n, m + 1) for n, m in zip((rows, columns), shape, strict=True))
+    counts = np.zeros(2, dtype=np.int64)
+    counted = 0
+    for begin in range(0, shape[0], ROWS_AT_ONCE):
+        edges = down[begin : begin + ROWS_AT_ONCE + 1]
+        low, high = math.floor(edges[0]), math.ceil(edges[-1])
+        linear, faults = _linear(decoded.pixels[low:high], is_srgb, decoded.is_associated)
+        counts += faults[:, counted - low :].sum(axis=(1, 2))  # bands may share a row
+        counted = high
+        band = _averaged(_averaged(linear, across, 1), edges - low, 0)
+        texels[begin : begin + len(band)] = band
+    endless, negative = counts.tolist()
     texels.flags.writeable = False
     reports = []
     if endless:
@@ -339,10 +344,18 @@ def _count(number: int, what: str) -> str:
 
 def _linear(
     pixels: NDArray[Any], is_srgb: bool, is_associated: bool
-) -> tuple[NDArray[np.float32], int, int]:
-    """Return linear texels times alpha, how many were not finite, and how many negative.
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return linear texels times alpha (h, w, 4), and which had what cannot shine.
 
-    ``pixels`` is (h, w, 1 to 4): grey, grey and alpha, RGB, or RGB and alpha.
+    Parameters
+    ----------
+    pixels : (h, w, 1 to 4)
+        Grey, grey and alpha, RGB, or RGB and alpha.
+
+    Returns
+    -------
+    faults : (2, h, w) bool
+        Not finite, and negative; (2, h, 0) for whole numbers, which are neither.
     """
     channels = pixels.shape[2]
     colours = pixels[..., :3] if channels > 2 else pixels[..., :1]
@@ -350,16 +363,15 @@ def _linear(
     has_alpha = channels in (2, 4)
     texels[..., 3] = _to_unit(pixels[..., -1]) if has_alpha else 1.0
     alpha = texels[..., 3:]
-    endless = negative = 0
+    faults = np.zeros((2, len(texels), 0), dtype=np.bool_)
     if pixels.dtype.kind == "f":
         with np.errstate(invalid="ignore"):
             texels[..., :3] = colours
             usable = np.abs(texels) <= LARGEST_RADIANCE  # False for NaN
-        bad = ~usable.all(axis=-1)
-        endless = int(bad.sum())
-        texels[bad, :3] = 0.0
+        endless = ~usable.all(axis=-1)
+        texels[endless, :3] = 0.0
         texels[~usable[..., 3], 3] = 1.0
-        negative = int((texels < 0.0).any(axis=-1).sum())
+        faults = np.stack((endless, (texels < 0.0).any(axis=-1)))
         np.maximum(texels, 0.0, out=texels)
         np.minimum(alpha, 1.0, out=alpha)
     if is_srgb and has_alpha and is_associated:
@@ -368,7 +380,7 @@ def _linear(
             texels[..., :3] = _to_unit(colours)
         solid = np.where(alpha > 0.0, alpha, np.float32(1.0))
         texels[..., :3] = srgb_decoded(texels[..., :3] / solid) * alpha
-        return texels, endless, negative
+        return texels, faults
     if pixels.dtype.kind == "f":
         if is_srgb:
             texels[..., :3] = srgb_decoded(texels[..., :3])
@@ -378,7 +390,7 @@ def _linear(
         texels[..., :3] = _to_unit(colours)
     if has_alpha and not is_associated:
         texels[..., :3] *= alpha
-    return texels, endless, negative
+    return texels, faults
 
 
 def _to_unit(values: NDArray[Any]) -> NDArray[np.float32]:
@@ -400,18 +412,24 @@ def srgb_decoded(values: NDArray[np.floating]) -> NDArray[np.floating]:
     ).astype(values.dtype)
 
 
-def _averaged(texels: NDArray[np.float32], size: int, axis: int) -> NDArray[np.float32]:
-    """Return texels averaged over equal shares of an axis, parts of texels included."""
-    count = texels.shape[axis]
-    if size == count:
+def _averaged(texels: NDArray[np.float32], edges: NDArray[Any], axis: int) -> NDArray[np.float32]:
+    """Return texels averaged along an axis between edges [texels], parts of texels included.
+
+    ``edges`` (n + 1,) ascend by equal steps of at least a texel.
+    """
+    count, step = texels.shape[axis], float(edges[1] - edges[0])
+    if step == 1.0:
         return texels
-    edges = np.linspace(0.0, count, size + 1)
     first = np.floor(edges[:-1]).astype(np.int64)
-    total = np.zeros([size if i == axis else n for i, n in enumerate(texels.shape)], np.float32)
-    for tap in range(math.ceil(count / size) + 1):
-        index = first + tap
-        share = np.minimum(index + 1, edges[1:]) - np.maximum(index, edges[:-1])
-        weight = (np.maximum(share, 0.0) * (size / count)).astype(np.float32)
-        taken = np.take(texels, np.minimum(index, count - 1), axis=axis)
-        total += taken * weight.reshape([-1 if i == axis else 1 for i in range(texels.ndim)])
+    if np.array_equal(edges, np.round(edges)):
+        weights: list[Any] = [np.float32(1.0 / step)] * round(step)
+    else:
+        shape = [-1 if i == axis else 1 for i in range(texels.ndim)]
+        weights = []
+        for i in range(math.ceil(step) + 1):
+            share = np.minimum(first + i + 1, edges[1:]) - np.maximum(first + i, edges[:-1])
+            weights.append((np.maximum(share, 0.0) / step).astype(np.float32).reshape(shape))
+    total: NDArray[np.float32] = np.take(texels, first, axis=axis) * weights[0]
+    for i, weight in enumerate(weights[1:], 1):
+        total += np.take(texels, np.minimum(first + i, count - 1), axis=axis) * weight
     return total

@@ -401,7 +401,7 @@ def skip_faint_lights(app: Application, out: Path) -> None:
 def save_reload_compare(app: Application, out: Path) -> None:
     path = out / "saved.json"
     app.drag("vertex 0.2", 30.0, -20.0)
-    app.enter("##radiance", 2.5)
+    app.act(lambda ctx: ctx.item_input_value("//Light/light key/##radiance", 2.5))
     app.window.documents.save_as(path)
     assert not app.window.editor.is_modified
     app.frame()
