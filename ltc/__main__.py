@@ -1,4 +1,4 @@
-"""Command line of the tables: ``python -m ltc``.
+"""Command line of the library: tables and measurements, ``python -m ltc``.
 
 Exit codes: 0 success, 1 failure, 2 bad input (one sentence on stderr), 130
 interrupted. Results go to stdout, everything else to stderr.
@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from ltc import check_command, export, fit_command
+from ltc import check_command, export, fit_command, textures_command
 
 
 class _Parser(argparse.ArgumentParser):
@@ -29,6 +29,7 @@ def _parser() -> _Parser:
     fit_command.add_parser(commands)
     check_command.add_parser(commands)
     export.add_parser(commands)
+    textures_command.add_parser(commands)
     return parser
 
 
@@ -44,6 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return check_command.run(parsed)
         if parsed.command == "export":
             return export.run(parsed)
+        if parsed.command == "textures":
+            return textures_command.run(parsed)
         return fit_command.run(parsed)
     except ValueError as error:
         print(f"python -m ltc: {error}", file=sys.stderr)

@@ -26,8 +26,8 @@ How
     arrays go on for four texels, which the widest filter's support never leaves.
 
 Measured with the fetch of `ltc.textured` and five taps, mean error of the shading integral x 1000
-(`docs/textures.md`): 3.3; PAD 1/2 instead of 1/4 at the same texel size 3.3, level 0 at twice the
-size 3.1; (.30 .42 .28), (.45 .33 .22), (.37 .42 .21) for the three weights 2 to 3 % more.
+(`docs/textures.md`): 3.3; PAD 1/8 or 1/2 with as many texels 3.3, 3.5; level 0 at twice the size
+3.2, at four times 3.2; (.33 .40 .27) or (.30 .42 .28) for the three weights 3.4, 3.5.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ for. All of it is continuous in the configuration, and for a = b all taps are on
 tilt adds, and the horizon of cosine space.
 
 GGX itself takes the footprint of a transformed cosine that resembles it (`ggx_mean_radiance`).
-Twins in GLSL are to come. Errors and the alternatives tried are in `docs/textures.md`.
+Twin: ``shaders/ltc/picture.glsl``. Errors and the alternatives tried are in `docs/textures.md`.
 """
 
 from __future__ import annotations

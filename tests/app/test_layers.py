@@ -129,6 +129,7 @@ def test_scene_needs_nothing_of_this_program() -> None:
 
 LTC_COMMANDS = {
     "ltc.check_command": {"rich"},  # the report as a table
+    "ltc.textures_command": {"rich"},  # errors as a table
     "ltc.check_plots": {"matplotlib"},  # an extra; the command says so where it is missing
     "ltc.export": {"OpenEXR"},  # no other format needs it; imported where an EXR is written
 }
