@@ -3,9 +3,9 @@
     .venv/bin/pip install "matplotlib>=3.9"
     .venv/bin/python -m docs.figures.error_bytes [--measure FOLDER]
 
-``--measure`` fits nine tables and three formulas into a folder, those that are not there yet, and measures
-them all on the same rectangles, which no fit has seen (half an hour on two cores; the shipped
-table is measured as it is). Without it the figures are only drawn.
+``--measure`` fits nine tables and three formulas into a folder, those that are not there yet,
+and measures them all on the same rectangles, which no fit has seen (half an hour on two cores;
+the shipped tables are measured as they are). Without it the figures are only drawn.
 
 A formula here is X of ``M = M0 (I + X)`` as polynomials of the table's four coordinates, up to
 a total degree, fitted to the same cases with the same loss; 'degree none' is M0 itself. Formulas
