@@ -48,7 +48,7 @@ from app.gui.viewport_window import viewport_window
 from app.panels.performance import performance_panel
 from app.panels.plan import plan_panel
 from app.panels.question import unsaved_question
-from app.panels.status import status_bar
+from app.panels.status import noise_text, status_bar
 from app.render.renderer import Renderer
 from app.render.techniques import technique_of
 from app.scene import Scene
@@ -251,7 +251,9 @@ class Window:
         size = (shot.width, shot.height) if shot is not None else (0, 0)
         text = f"Last edit: {step}" if step else "Drag the picture to look around"
         technique = technique_of(self.editor.scene, self.viewport.settings.technique)
-        status_bar(text, self.viewport.picture.samples, size, technique)
+        picture = self.viewport.picture
+        noise = None if picture.noise is None else picture.noise.relative
+        status_bar(text, picture.samples, size, technique, noise_text(noise, picture.seconds))
 
     # --- docked windows -------------------------------------------------------------
 

@@ -21,6 +21,7 @@ from imgui_bundle import ImVec2, imgui
 from app.errors import InputError
 from app.gui import theme
 from app.gui.overlays import View
+from app.render.noise import Noise
 from app.render.renderer import Renderer
 from app.scene import Camera, RenderSettings, Scene, Shot
 
@@ -33,6 +34,9 @@ LONGEST_SETTLE = 1.0
 
 KEYS = tuple(key for key in imgui.Key if imgui.Key.tab <= key < imgui.Key.gamepad_start)
 """Those of the keyboard."""
+
+LOOK_AGAIN = 1.25
+"""Noise is estimated anew after this many times as many samples: it waits for the GPU."""
 
 SMALLEST = 4
 """Most that width and height of a moving picture are divided by."""
@@ -61,12 +65,19 @@ class LivePicture:
     samples : (done, wanted)
     history : deque of float
         Milliseconds of the last samples.
+    noise : Noise or None
+        The estimated error of a picture made of random samples, as it was when they last were
+        `LOOK_AGAIN` times as many.
+    seconds : float
+        What its samples took so far.
     """
 
     def __init__(self, renderer: Renderer, reporter: Reporter) -> None:
         self.shot: Shot | None = None
         self.samples = (0, 0)
         self.history: deque[float] = deque(maxlen=120)
+        self.noise: Noise | None = None
+        self.seconds = 0.0
         self._renderer = renderer
         self._reporter = reporter
         self._wanted: tuple[Scene, float] | None = None
@@ -137,6 +148,7 @@ class LivePicture:
             began = time.perf_counter()
             samples = self._renderer.accumulate(shot, settings.samples)
             seconds = time.perf_counter() - began
+            self._look_at_noise(samples, settings.samples)
         except Exception as failure:
             if not isinstance(failure, InputError):
                 traceback.print_exc()
@@ -149,6 +161,7 @@ class LivePicture:
         timings = self._renderer.timings(wait=False)
         gpu = sum(value for name, value in timings.items() if name != "cpu") / 1e3
         self.history.append(1e3 * max(seconds, gpu))
+        self.seconds = max(seconds, gpu) + (self.seconds if samples > 1 else 0.0)
         # The GPU's figures are those of the sample before, the size of which counts.
         self._full_size_seconds = seconds + gpu * self._divisor**2
         self._divisor = divisor
@@ -157,6 +170,14 @@ class LivePicture:
         """Render everything anew: a file that the scene names has changed."""
         self._failed, self.samples = None, (0, self.samples[1])
         self._renderer.begin_again()
+
+    def _look_at_noise(self, samples: int, wanted: int) -> None:
+        if samples == 1:
+            self.noise = None
+        before = self.noise.samples if self.noise is not None else 1
+        is_last = samples >= wanted - wanted % 2
+        if samples % 2 == 0 and (is_last or samples >= LOOK_AGAIN * before):
+            self.noise = self._renderer.noise()
 
     def draw(self, view: View) -> None:
         """Draw the picture, or its absence, into the current Dear ImGui window."""

@@ -11,7 +11,7 @@ from app.panels.widgets import choice, heading, label, slider, tooltip
 from app.plan_rows import share_text
 from app.scene import PIXEL_VIEWS, TONE_MAPS, Display, RenderSettings
 
-SAMPLE_COUNTS = (1, 4, 8, 16, 32, 64, 128, 256)
+SAMPLE_COUNTS = (1, 4, 8, 16, 32, 64, 128, 256, 1024, 4096, 16384, 65536)
 
 _TONE_MAP_TIP = (
     "agx: gentle, keeps bright colours from clipping; aces: contrasty, as film; "

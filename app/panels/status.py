@@ -37,7 +37,22 @@ def help_line(scene: Scene, selection: Selection, tool: str) -> str:
     return "Click a light to shape it, an object to change its material · drag to look around"
 
 
-def status_bar(text: str, samples: tuple[int, int], size: tuple[int, int], technique: str) -> None:
+def noise_text(relative: float | None, seconds: float) -> str:
+    """Return what there is to say of a picture made of random samples, nothing of others.
+
+    Parameters
+    ----------
+    relative : float or None
+        Its estimated error as a share of its mean.
+    seconds : float
+        What its samples took.
+    """
+    return "" if relative is None else f" in {seconds:.1f} s, error {100.0 * relative:.2g} %"
+
+
+def status_bar(
+    text: str, samples: tuple[int, int], size: tuple[int, int], technique: str, noise: str = ""
+) -> None:
     """Draw help on the left, the state of the picture on the right.
 
     Parameters
@@ -48,10 +63,12 @@ def status_bar(text: str, samples: tuple[int, int], size: tuple[int, int], techn
         Samples per pixel gathered, and how many there will be.
     size : (int, int)
         Pixels.
+    noise : str
+        See `noise_text`.
     """
     imgui.text_colored(MUTED, text)
     done, total = samples
-    state = f"{technique}    {size[0]} × {size[1]}    {done} of {total} samples"
+    state = f"{technique}    {size[0]} × {size[1]}    {done} of {total} samples{noise}"
     width = imgui.calc_text_size(state).x
     imgui.same_line(imgui.get_window_width() - width - imgui.get_font_size())
     imgui.text_colored(MUTED, state)

@@ -194,6 +194,8 @@ class LightingFeatures:
         Lights that a bound puts below what can be seen are skipped, which the user asked for.
     anisotropic : bool
         Lobes are looked up in the anisotropic tables, where the technique has tables.
+    estimates_noise : bool
+        Samples are random, so the picture tells how far off it is (`app.render.noise`).
     """
 
     specular: bool
@@ -207,6 +209,7 @@ class LightingFeatures:
     counts: bool
     anisotropic: bool
     culls: bool
+    estimates_noise: bool
 
     @classmethod
     def of(
@@ -254,6 +257,7 @@ class LightingFeatures:
             view == "cost",
             anisotropic,
             culls and (specular or diffuse),
+            samples > 1 and find_technique(used_technique).is_sampled and view != "cost",
         )
 
     @property
@@ -287,6 +291,7 @@ class LightingFeatures:
             "HAS_SHAPES": int(self.shapes),
             "ACCUMULATES": int(self.accumulates),
             "PROBES": 0,
+            "ESTIMATES_NOISE": int(self.estimates_noise),
             "COUNTS_EVALUATIONS": int(self.counts),
             "HAS_TANGENTS": int(self.tangents),
             "CULLS": int(self.culls and find_technique(self.technique).culls),

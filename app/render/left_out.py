@@ -84,6 +84,14 @@ def left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
             "one sample per pixel needs no history",
             pixels * FORMAT_BYTES["RGBA32F"],
         )
+    elif features.lit and not features.estimates_noise:
+        leave(
+            "noise attachments and their mean",
+            "costs have no noise"
+            if features.counts
+            else f"technique {features.technique} has no noise",
+            2 * pixels * FORMAT_BYTES["RGBA32F"],
+        )
     if features.lit and not features.tangents:
         anisotropic = any(material.is_anisotropic and any(material.f0) for material in used)
         leave(

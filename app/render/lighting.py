@@ -25,10 +25,10 @@ from app.render.tables import table_textures
 from app.scene import AreaLight, Material
 
 # Texture units and uniform block bindings; each pass binds its own anew.
-SURFACES, TANGENTS, HISTORY, LIGHTS, MATERIALS, FIRST_TABLE = range(6)
+SURFACES, TANGENTS, HISTORY, NOISE_HISTORY, LIGHTS, MATERIALS, FIRST_TABLE = range(7)
 
 POINT_INPUTS = ("positions", "normals", "tangents", "views", "alphas")
-FIRST_POINT_UNIT = 8
+FIRST_POINT_UNIT = 9
 """Behind the units of the tables."""
 PICTURES = FIRST_POINT_UNIT + len(POINT_INPUTS)
 
@@ -135,6 +135,7 @@ class LightingPass:
         history: moderngl.Texture | None,
         sample: int,
         faint: float = 0.0,
+        noise_history: moderngl.Texture | None = None,
     ) -> None:
         """Write the radiance of one sample, or its mean with ``history``, to ``target``.
 
@@ -148,6 +149,8 @@ class LightingPass:
             The mean of the ``sample`` samples before this one.
         faint : float
             Radiance that all that is skipped at a pixel may add up to.
+        noise_history : texture or None
+            What goes with ``history`` where ``features`` say that noise is estimated.
         """
         width, height = target.size
         begin_pass(target, target.size)
@@ -160,6 +163,10 @@ class LightingPass:
         if history is not None:
             set_uniform(program, "history", HISTORY)
             history.use(HISTORY)
+        if noise_history is not None:
+            set_uniform(program, "noise_history", NOISE_HISTORY)
+            noise_history.use(NOISE_HISTORY)
+        set_uniform(program, "sample_sign", 1.0 - 2.0 * (sample % 2))
         set_uniform(program, "sample_weight", 1.0 / (sample + 1))
         set_uniform(program, "sample_index", sample)
         set_uniform(program, "faint_radiance", faint)

@@ -26,6 +26,8 @@ ATTACHMENTS = {
     "depth": "DEPTH24",
     "radiance": "RGBA32F",
     "radiance 2": "RGBA32F",
+    "noise": "RGBA32F",
+    "noise 2": "RGBA32F",
     "display": "RGBA8",
 }
 """Every attachment's format."""
@@ -97,6 +99,8 @@ def needs_of(
     attachments.append("radiance")
     if lighting.lit and lighting.accumulates:
         attachments.append("radiance 2")
+        if lighting.estimates_noise:
+            attachments += ["noise", "noise 2"]
     attachments.append("display")
     return Needs(
         lighting, tuple(programs), tuple((name, ATTACHMENTS[name]) for name in attachments)

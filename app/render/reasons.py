@@ -69,6 +69,8 @@ def resource_reason(name: str, shot: Shot, features: LightingFeatures) -> str:
         "depth": "which surface is in front",
         "radiance": "the picture in linear light",
         "radiance 2": f"{shot.settings.samples} samples are averaged, each with those before",
+        "noise": "samples are random: what rounding took, and the estimated error",
+        "noise 2": "the same, of the samples before",
         "display": "what screens and .png files show",
         "light shapes": "visible lights with edges only",
         "light curves": "visible lights with curves",

@@ -23,6 +23,7 @@ from app.render.features import LightingFeatures, LightNeeds, Limits
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
 from app.render.needs import ATTACHMENTS, FORMAT_BYTES, Needs, needs_of
+from app.render.noise import Noise, NoisePass
 from app.render.pack import CurveForm
 from app.render.picking import Hit, Picker, direction_from_octahedral, facing_normal, turned_tangent
 from app.render.picture_layout import NO_PICTURES, lay_pictures
@@ -81,6 +82,10 @@ class _Seen:
                 for part in ("camera", "materials", "objects", "lights")
             )
         )
+
+
+_NOISE_OF = {"radiance": "noise", "radiance 2": "noise 2"}
+"""Attachments that are written and read together."""
 
 
 class _Targets:
@@ -187,6 +192,7 @@ class Renderer:
         self._gbuffer = GBufferPass(ctx, self.programs)
         self._lighting = LightingPass(ctx, self.programs)
         self._display = DisplayPass(ctx, self.programs)
+        self._noise = NoisePass(ctx, self.programs)
         self._targets = _Targets(ctx)
         self._picker = Picker(ctx)
         self._timers = PassTimers(ctx)
@@ -304,6 +310,24 @@ class Renderer:
         return self._targets.texture(self._newest)
 
     # Questions
+
+    def noise(self) -> Noise | None:
+        """Return the estimated error of the picture; None unless it is made of random samples.
+
+        Raises
+        ------
+        RuntimeError
+            If the number of samples is odd: halves are compared.
+        """
+        if self._needs is None or not self._needs.lighting.estimates_noise or not self._newest:
+            return None
+        if self._samples % 2:
+            raise RuntimeError(f"there are {self._samples} samples, expected an even number")
+        texture = self._targets.texture
+        return self._noise.measure(
+            texture("gbuffer"), texture(self._newest), texture(_NOISE_OF[self._newest]),
+            self._samples,
+        )  # fmt: skip
 
     def radiance_at(self, column: int, row: int) -> Vec3:
         """Return the mean linear radiance of one pixel, counted from the top left.
@@ -566,6 +590,7 @@ class Renderer:
         self._gbuffer.release()
         self._lighting.release()
         self._display.release()
+        self._noise.release()
         self._timers.release()
         self.programs.release()
         self._picker.release()
@@ -612,6 +637,8 @@ class Renderer:
         self._targets.keep_only({name for name, _ in needs.attachments} - {"depth"})
         if needs.accumulates:
             self._targets.texture("radiance 2")
+        if features.estimates_noise:
+            self._targets.texture("noise 2")
         self._needs = needs
         self._seen = _Seen(shot)
         self._stale = False
@@ -642,7 +669,10 @@ class Renderer:
         shot, needs = self._seen.shot, self._needs
         older = self._newest
         newest = "radiance 2" if older == "radiance" and needs.accumulates else "radiance"
-        target = self._targets.framebuffer(newest)
+        written = [newest]
+        if needs.lighting.estimates_noise:
+            written.append(_NOISE_OF[newest])
+        target = self._targets.framebuffer(*written)
         if needs.lighting.lit:
             frame = CameraFrame.of(shot.scene.camera, shot.width / shot.height)
             positions = shot.settings.positions
@@ -664,6 +694,9 @@ class Renderer:
                     self._targets.texture(older) if older else None,
                     self._samples,
                     _faint_radiance(shot),
+                    self._targets.texture(_NOISE_OF[older])
+                    if older and needs.lighting.estimates_noise
+                    else None,
                 )
             self.lighting_passes += 1
         else:

@@ -9,6 +9,9 @@
 #include "common/light_picture.glsl"
 #include "passes/picture_storage.glsl"
 #endif
+#if ESTIMATES_NOISE
+#include "common/running_mean.glsl"
+#endif
 #if HAS_SPECULAR || HAS_DIFFUSE
 #include "passes/material_storage.glsl"
 #include "common/frame.glsl"
@@ -32,6 +35,10 @@ uniform sampler2D surfaces;
 #if ACCUMULATES
 uniform sampler2D history;
 uniform float sample_weight;  // 1 / samples so far, this one included
+#if ESTIMATES_NOISE
+uniform sampler2D noise_history;
+uniform float sample_sign;    // 1 and -1 in turn
+#endif
 #endif
 
 #if HAS_SPECULAR || HAS_DIFFUSE || HAS_PICTURES
@@ -122,12 +129,20 @@ vec3 seen_light(int index, float depth)
 #endif
 
 layout(location = 0) out vec4 radiance;
+#if ESTIMATES_NOISE
+// What rounding took from the radiance; luminance of what is reflected, averaged with
+// alternating signs: half of what the means of even and odd samples differ by.
+layout(location = 1) out vec4 noise;
+#endif
 
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec4 surface = texelFetch(surfaces, pixel, 0);
     vec4 value = vec4(0.0);
+#if ESTIMATES_NOISE
+    float reflected = 0.0;
+#endif
     if (surface.z > 0.0) {
         value.a = 1.0;
 #if HAS_SHAPES
@@ -142,6 +157,9 @@ void main()
 #if HAS_SPECULAR || HAS_DIFFUSE
         if (surface.w >= 0.0) {
             value.rgb = surface_radiance(surface);
+#if ESTIMATES_NOISE
+            reflected = dot(value.rgb, vec3(0.2126, 0.7152, 0.0722));
+#endif
         }
 #endif
     }
@@ -150,10 +168,22 @@ void main()
 #endif
 #if ACCUMULATES
     // The running mean, not a sum: its rounding errors die out instead of adding up.
+#if ESTIMATES_NOISE
+    noise = vec4(0.0, 0.0, 0.0, sample_sign * reflected);
+    if (sample_weight < 1.0) {
+        vec4 mean = texelFetch(history, pixel, 0);
+        vec4 rest = texelFetch(noise_history, pixel, 0);
+        noise.a = mix(rest.a, noise.a, sample_weight);
+        rest.a = 0.0;
+        value = next_mean(mean, rest, value, sample_weight);
+        noise.rgb = rest.rgb;
+    }
+#else
     if (sample_weight < 1.0) {
         vec4 mean = texelFetch(history, pixel, 0);
         value = mean + (value - mean) * sample_weight;
     }
+#endif
 #endif
     radiance = value;
 }

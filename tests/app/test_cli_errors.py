@@ -427,6 +427,12 @@ CASES: dict[str, Case] = {
     "size negative": bad_arguments(*SHOT, "--size", "-4x4", parts=("--size", "'-4x4'")),
     "size too large": bad_arguments(*SHOT, "--size", "99999x9", parts=("--size", "16384")),
     "no samples": bad_arguments(*SHOT, "--samples", "0", parts=("--samples", "1 to 65536")),
+    "no error": bad_arguments(
+        *SHOT, "--until-error", "0", parts=("--until-error is '0'", "such as 0.01 or 1%")
+    ),
+    "error of what has none": bad_arguments(
+        *SHOT, "--until-error", "1%", parts=("--until-error", "ltc+residual")
+    ),
     "samples not whole": bad_arguments(*SHOT, "--samples", "1.5", parts=("--samples", "1.5")),
     "unknown technique": bad_arguments(
         *SHOT, "--technique", "lct", parts=("'lct'", "did you mean 'ltc'")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -70,6 +71,21 @@ def test_shot_writes_png_and_exr(folder: Path) -> None:
     bright = radiance[..., 1] > 1.99
     assert colours[bright].min() > colours[~bright].mean()
     assert sorted(path.name for path in folder.iterdir()) == ["a.exr", "a.png", "lit.json"]
+
+
+def test_shot_tells_the_noise_of_random_samples(folder: Path) -> None:
+    shot = ("shot", "lit.json", "-o", "a.png", "--size", "48x32", "--technique")
+    said = r"(\d+) samples in \d+\.\d s, estimated error ([\d.]+) % of the mean\n"
+    found = re.fullmatch(said, command(folder, *shot, "reference", "--samples", "9").stderr)
+    assert found is not None
+    assert found[1] == "9"
+    coarse = float(found[2])
+    found = re.fullmatch(said, command(folder, *shot, "reference", "--until-error", "2%").stderr)
+    assert found is not None
+    assert int(found[1]) > 16
+    assert float(found[2]) <= 2.0 < coarse
+    done = command(folder, *shot, "ltc", "--until-error", "2%", code=2)
+    assert "technique ltc has no noise that would fall, expected --technique" in done.stderr
 
 
 def test_shots_are_reproducible(folder: Path) -> None:

@@ -376,6 +376,25 @@ def see_the_cost(app: Application, out: Path) -> None:
     assert np.array_equal(app.picture(), before)
 
 
+def watch_the_noise_fall(app: Application, out: Path) -> None:
+    """The status bar tells the error of random samples as they gather, and of nothing else."""
+    picture = app.window.viewport.picture
+    assert picture.noise is None
+    found = []
+    for samples in (2, 16):
+        settings = app.window.viewport.settings
+        app.window.viewport.settings = replace(settings, technique="reference", samples=samples)
+        app.settle()
+        assert picture.noise is not None
+        assert picture.noise.samples == picture.samples[0] == samples
+        assert picture.seconds > 0.0
+        found.append(picture.noise.relative)
+    assert found[1] < 0.6 * found[0]
+    app.window.viewport.settings = replace(app.window.viewport.settings, technique="ltc")
+    app.settle()
+    assert picture.noise is None
+
+
 def skip_faint_lights(app: Application, out: Path) -> None:
     def choose(share: str) -> None:
         app.act(lambda ctx: ctx.window_focus("//Display"))
@@ -635,6 +654,7 @@ SCENARIOS = (
     aim_and_look_by_the_context_menu,
     every_panel_edits_the_scene,
     see_the_cost,
+    watch_the_noise_fall,
     skip_faint_lights,
     save_reload_compare,
     save_and_open_by_the_dialog,

@@ -33,6 +33,7 @@ SCENARIOS = (
     "aim_and_look_by_the_context_menu",
     "every_panel_edits_the_scene",
     "see_the_cost",
+    "watch_the_noise_fall",
     "skip_faint_lights",
     "save_reload_compare",
     "save_and_open_by_the_dialog",
