@@ -16,6 +16,7 @@ STYLES: Mapping[str, tuple[str, Shape]] = {
     "ltc": ("#2f81f7", "circle"),
     "ltc, other tables": ("#7a73e8", "diamond"),
     "ltc, cut otherwise": ("#b8860b", "down"),
+    "ltc, other looks at pictures": ("#0b8f6f", "triangle"),
     "ggx": ("#e8590c", "square"),
     "adaptive": ("#2f9e44", "triangle"),
     "adaptive-extrapolated": ("#12a5a5", "down"),
@@ -42,6 +43,8 @@ def kind_of(technique: str) -> str:
     if not entry.variant:
         return entry.name
     changes = VARIANTS[entry.variant]
+    if changes.is_of_pictures:
+        return "ltc, other looks at pictures"
     return "ltc, other tables" if changes.residual is not None else "ltc, cut otherwise"
 
 

@@ -30,6 +30,8 @@ CURVED = (
 """What differs from ``ltc`` only where outlines have curves, as ``ltc``'s own number does."""
 TABLES = ("ltc/no-table", "ltc/table-4", "ltc/table-8", "ltc/table-32")
 """Of the isotropic table: what an anisotropic scene looks up has one size."""
+PICTURES = ("ltc/foot-tap", "ltc/taps-1", "ltc/taps-3", "ltc/taps-9")
+"""What differs from ``ltc`` only where lights have pictures."""
 OTHERS = (
     "ltc/undivided", "ltc/published-clip",
     "representative-point",
@@ -119,7 +121,14 @@ def entries_of(scene: Scene, wanted: Sequence[str] = ()) -> tuple[Entry, ...]:
     used = scene.object_materials()
     anisotropic = any(m.is_anisotropic and any(m.f0) for m in used)
     curved = has_curves(scene.lights)
-    names = wanted or (*NUMBERS, *CURVED, *(() if anisotropic else TABLES), *OTHERS)
+    pictures = any(light.picture is not None and any(light.radiance) for light in scene.lights)
+    names = wanted or (
+        *NUMBERS,
+        *CURVED,
+        *(() if anisotropic else TABLES),
+        *(PICTURES if pictures else ()),
+        *OTHERS,
+    )
     found = []
     for name in names:
         resolved = suited_technique(name, anisotropic) if name == AUTOMATIC else name

@@ -32,9 +32,6 @@ from app.render.tables import anisotropic_azimuths
 from app.render.techniques import DEFAULT_TECHNIQUE, find_technique, parse_technique
 from app.scene import AreaLight, PixelView, Scene
 
-PICTURE_TAPS = 5
-"""Looks at a picture for a lobe, along the longer axis of what it sees of it."""
-
 STORAGE_TEXTURE_WIDTH = 1024
 """Texels in a row of the textures that hold lights or materials too many for a block."""
 
@@ -159,8 +156,6 @@ class LightNeeds:
             "HAS_TWO_SIDED": int(self.two_sided),
             "HAS_CURVES": int(self.curved),
             "HAS_EXACT_FMA": int(self.exact_fma),
-            "HAS_PICTURES": int(self.pictures > 0),
-            "PICTURE_TAPS": PICTURE_TAPS if self.pictures else 0,
             "LIGHT_STORAGE_UNIFORM": int(self.uniform_texels > 0),
             "LIGHT_TEXELS": self.uniform_texels,
             "STORAGE_TEXTURE_WIDTH": STORAGE_TEXTURE_WIDTH,
@@ -296,10 +291,20 @@ class LightingFeatures:
             "HAS_TANGENTS": int(self.tangents),
             "CULLS": int(self.culls and find_technique(self.technique).culls),
             **technique_defines(self.technique, self.anisotropic),
+            **picture_defines(lights, self.technique),
             "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
             "MATERIAL_TEXELS": self.uniform_materials,
             **lights.defines(),
         }
+
+
+def picture_defines(lights: LightNeeds, technique: str) -> dict[str, int]:
+    """Return the numbers that say how lobes look at pictures, 0 where no light has one."""
+    taps = parse_technique(technique).changes.picture_taps
+    return {
+        "HAS_PICTURES": int(lights.pictures > 0),
+        "PICTURE_TAPS": taps if lights.pictures else 0,
+    }
 
 
 def technique_defines(technique: str, anisotropic: bool) -> dict[str, int]:
@@ -342,5 +347,6 @@ def probe_defines(lights: LightNeeds, technique: str, anisotropic: bool) -> dict
         "COUNTS_EVALUATIONS": 0,
         "CULLS": 0,
         **technique_defines(lights.technique(technique), anisotropic),
+        **picture_defines(lights, technique),
         **lights.defines(),
     }

@@ -139,6 +139,10 @@ TECHNIQUES: dict[str, Technique] = {
 """By name, in the order in which help lists them."""
 
 
+PICTURE_TAPS = 5
+"""Looks that a lobe takes at a light's picture, along the longer axis of what it sees of it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Variant:
     """What is done otherwise than in ``ltc``.
@@ -153,12 +157,21 @@ class Variant:
         Whether what is cut off below the surface is made up for.
     cuts_at_lobe : bool
         Whether lights are cut at the lobe's own horizon instead of the surface's.
+    picture_taps : int
+        Looks that a lobe takes at a light's picture, `ltc.textured`'s number; 0 for one where
+        Heitz et al. 2016 look, at the foot of the perpendicular, and as wide.
     """
 
     description: str
     residual: int | None = None
     divides: bool = True
     cuts_at_lobe: bool = False
+    picture_taps: int = PICTURE_TAPS
+
+    @property
+    def is_of_pictures(self) -> bool:
+        """Whether it differs only where lights have pictures."""
+        return self.picture_taps != PICTURE_TAPS
 
 
 VARIANTS: dict[str, Variant] = {
@@ -176,6 +189,13 @@ VARIANTS: dict[str, Variant] = {
         divides=False,
         cuts_at_lobe=True,
     ),
+    "foot-tap": Variant(
+        "one look at a light's picture, where and as wide as published, on the levels of here",
+        picture_taps=0,
+    ),
+    "taps-1": Variant("one look at a light's picture instead of 5", picture_taps=1),
+    "taps-3": Variant("3 looks at a light's picture", picture_taps=3),
+    "taps-9": Variant("9 looks at a light's picture", picture_taps=9),
 }
 """Of ``ltc``, to measure what its choices are worth."""
 

@@ -11,7 +11,7 @@ const float PICTURE_MARGIN = 1.0 / 6.0;
 // axis each fills.
 const float PICTURE_REACH = 0.97;
 const float PICTURE_NARROW = 0.78;
-#if PICTURE_TAPS == 1
+#if PICTURE_TAPS <= 1
 const float PICTURE_SPREAD = 0.75;
 #elif PICTURE_TAPS == 3
 const float PICTURE_SPREAD = 0.58;
@@ -124,6 +124,24 @@ vec4 fetched_picture(LightPicture picture, vec2 place, float radius)
     return value;
 }
 
+#if PICTURE_TAPS == 0
+// One look where Heitz et al. 2016 look, at the foot of the perpendicular, and with a filter
+// that falls off as their Gaussian does: d = 2 sigma, sigma^2 = r^2 / 2 A.
+vec3 picture_average(
+    LightPicture picture, CosineTransform transform, PlanarLight light, PlaneView view)
+{
+    CosinePlane plane = cosine_plane(transform, light, view);
+    float n2 = max(dot(plane.n, plane.n), 1e-37);
+    vec3 away = dot(plane.foot, plane.n) / n2 * plane.n - plane.foot;
+    vec2 st = plane.foot_st +
+              vec2(dot(cross(away, plane.v), plane.n), dot(cross(plane.u, away), plane.n)) / n2;
+    vec2 scale = picture.level_from_plane.xy;
+    float r = abs(dot(plane.foot, plane.n)) * inversesqrt(n2);
+    float radius = 1.41421356 * r * sqrt(scale.x * scale.y * inversesqrt(n2));
+    vec4 value = fetched_picture(picture, scale * st + picture.level_from_plane.zw, radius);
+    return value.a > 0.0 ? value.rgb / value.a : vec3(0.0);
+}
+#else
 vec3 picture_average(
     LightPicture picture, CosineTransform transform, PlanarLight light, PlaneView view)
 {
@@ -183,3 +201,4 @@ vec3 picture_average(
     }
     return sum.a > 0.0 ? sum.rgb / sum.a : vec3(0.0);
 }
+#endif

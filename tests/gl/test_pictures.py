@@ -180,6 +180,43 @@ def test_lobes_see_what_the_library_says(renderer, tmp_path, outline):
         assert np.max(error) <= 1e-2
 
 
+@pytest.mark.parametrize("taps", [1, 3, 9])
+def test_other_numbers_of_taps(renderer, tmp_path, taps):
+    light = lamp(smooth_picture(tmp_path / "p.png"))
+    laid = lay_pictures((light,), 0.0, 16384).pictures[0]
+    case = random_case(laid, 2, 500, (0.01, 1.0))
+    settings = RenderSettings(f"ltc/taps-{taps}")
+    seen = renderer.probe(Scene(lights=(light,)), settings, *case.inputs)["diffuse"]
+    plain = renderer.probe(Scene(lights=(replace(light, picture=None),)), settings, *case.inputs)[
+        "diffuse"
+    ]
+    error = np.abs(seen - plain * cosine_mean_radiance(pyramid_of(laid), case.frames, taps))
+    assert np.mean(error) <= 2e-4
+    assert np.max(error) <= 1e-2
+
+
+def test_half_vectors_are_nearer_the_truth_than_feet(renderer, tmp_path):
+    """What the paper's place costs a diffuse surface, with the same levels.
+
+    Its footprints are nearly round, so that more taps change next to nothing.
+    """
+    light = lamp(smooth_picture(tmp_path / "p.png", 24, 16))
+    laid = lay_pictures((light,), 0.0, 16384).pictures[0]
+    case = random_case(laid, 3, 150, (0.05, 1.0))
+    front = case.inputs[0][:, 2] > 0.0
+    exact = textured_integrals(
+        laid.frame.texels[::-1, :, :3], outline_in_rectangle(laid), case.frames,
+        CosineLobe.diffuse(len(front)),
+    ).value * front[:, None]  # fmt: skip
+    errors = []
+    for variant in ("/foot-tap", "/taps-1", ""):
+        settings = RenderSettings(f"ltc{variant}")
+        seen = renderer.probe(Scene(lights=(light,)), settings, *case.inputs)["diffuse"]
+        errors.append(np.mean(np.abs(seen - exact)))
+    assert errors[1] < 0.6 * errors[0]
+    assert abs(errors[2] - errors[1]) < 0.01 * errors[1]
+
+
 @pytest.mark.parametrize("technique", ["reference", "ltc+residual"])
 @pytest.mark.parametrize("outline", [SQUARE, ring()], ids=["square", "ring"])
 def test_samples_converge_to_exact_integrals(renderer, tmp_path, technique, outline):
