@@ -85,12 +85,12 @@ GgxTerms ggx_terms(
             // Where the lobe looks and how wide, by the closed form alone: no table.
             AnisotropicLobe lobe = anisotropic_lobe(alpha, wo_tangent, mat3(1.0));
             terms.specular_colour = picture_average(
-                picture, cosine_transform(lobe, world_from_tangent), light, plane);
+                picture, cosine_transform(lobe, world_from_tangent), light, plane, false);
         }
 #endif
 #if HAS_DIFFUSE
         if (terms.diffuse > 0.0) {
-            terms.diffuse_colour = picture_average(picture, diffuse, light, plane);
+            terms.diffuse_colour = picture_average(picture, diffuse, light, plane, true);
         }
 #endif
     }

@@ -124,11 +124,24 @@ vec4 fetched_picture(LightPicture picture, vec2 place, float radius)
     return value;
 }
 
+// What one look at a footprint is for: its place and radius, `y` along the axis where
+// (1 + t^2)^(-3/2) has its share, `fill` the radius that fills that share.
+vec3 picture_look(Footprint print, vec2 axis, float b, float stretch, float fill, float y)
+{
+    float inv = inversesqrt(max(1.0 - y * y, 1e-8));
+    float tau = PICTURE_REACH * stretch * y * inv;
+    float filled = fill * inv * inv * inv;
+    float narrow = mix(1.0, PICTURE_NARROW, stretch * stretch);
+    float radius = b * sqrt(narrow * narrow * (1.0 + tau * tau) + filled * filled);
+    return vec3(print.centre + tau * axis, radius);
+}
+
 #if PICTURE_TAPS == 0
 // One look where Heitz et al. 2016 look, at the foot of the perpendicular, and with a filter
 // that falls off as their Gaussian does: d = 2 sigma, sigma^2 = r^2 / 2 A.
 vec3 picture_average(
-    LightPicture picture, CosineTransform transform, PlanarLight light, PlaneView view)
+    LightPicture picture, CosineTransform transform, PlanarLight light, PlaneView view,
+    bool is_diffuse)
 {
     CosinePlane plane = cosine_plane(transform, light, view);
     float n2 = max(dot(plane.n, plane.n), 1e-37);
@@ -142,8 +155,11 @@ vec3 picture_average(
     return value.a > 0.0 ? value.rgb / value.a : vec3(0.0);
 }
 #else
+// `is_diffuse`: the lobe is the cosine itself. What it sees is as stretched as the picture's
+// texels are, the same at every point, so that one look where that is little leaves no line.
 vec3 picture_average(
-    LightPicture picture, CosineTransform transform, PlanarLight light, PlaneView view)
+    LightPicture picture, CosineTransform transform, PlanarLight light, PlaneView view,
+    bool is_diffuse)
 {
     CosinePlane plane = cosine_plane(transform, light, view);
     Footprint whole = cosine_footprint(picture, plane);
@@ -161,8 +177,7 @@ vec3 picture_average(
                                 : vec2(print.shape.y, spread - half_gap);
     float axis2 = dot(axis, axis);
     axis = a * (axis2 > 0.0 ? axis * inversesqrt(axis2) : vec2(1.0, 0.0));
-    float stretch2 = max(1.0 - b * b / a2, 0.0);
-    float stretch = sqrt(stretch2);
+    float stretch = sqrt(max(1.0 - b * b / a2, 0.0));
     // Only where the light is, in the measure y of the axis that makes parts weigh alike.
     vec2 margin = vec2(0.7 * b);
     vec2 back = mix(print.centre - low, high - print.centre, lessThan(axis, vec2(0.0))) + margin;
@@ -170,20 +185,23 @@ vec3 picture_average(
     vec2 first = back * inversesqrt(back * back + axis * axis);
     vec2 last = forth * inversesqrt(forth * forth + axis * axis);
     float y = -min(first.x, first.y);
-    float part = (min(last.x, last.y) - y) / float(PICTURE_TAPS);
-    float narrow = mix(1.0, PICTURE_NARROW, stretch2);
-    float fill = 0.5 * PICTURE_SPREAD * PICTURE_REACH * part * stretch * a / b;
+    float whole_part = min(last.x, last.y) - y;
+    float filling = 0.5 * PICTURE_REACH * stretch * a / b;
+    if (is_diffuse && a < 1.5 * b) {
+        vec3 look = picture_look(print, axis, b, stretch, 0.75 * filling * whole_part,
+                                 y + 0.5 * whole_part);
+        vec4 value = fetched_picture(picture, look.xy, look.z);
+        return value.a > 0.0 ? value.rgb / value.a : vec3(0.0);
+    }
+    float part = whole_part / float(PICTURE_TAPS);
+    float fill = PICTURE_SPREAD * filling * part;
 
     vec3 taps[PICTURE_TAPS];  // place and radius
     float weights[PICTURE_TAPS];
     float largest = 0.0;
     y += 0.5 * part;
     for (int i = 0; i < PICTURE_TAPS; ++i) {
-        float inv = inversesqrt(max(1.0 - y * y, 1e-8));
-        float tau = PICTURE_REACH * stretch * y * inv;
-        float filled = fill * inv * inv * inv;
-        float radius = b * sqrt(narrow * narrow * (1.0 + tau * tau) + filled * filled);
-        taps[i] = vec3(print.centre + tau * axis, radius);
+        taps[i] = picture_look(print, axis, b, stretch, fill, y);
         weights[i] = 1.0;
 #if PICTURE_TAPS > 1
         float beyond = 1.0 + squared_distance(whole, taps[i].xy - whole.centre);

@@ -134,14 +134,14 @@ mat2x3 seen_pictures(PlanarLight light, SurfacePoint point, CosineTransform spec
     PlaneView view = plane_view(light, point.position);
 #if HAS_SPECULAR
     if (factors.x > 0.0) {
-        colours[0] = picture_average(picture, specular, light, view);
+        colours[0] = picture_average(picture, specular, light, view, false);
     }
 #endif
 #if HAS_DIFFUSE
     if (factors.y > 0.0) {
         mat3 shading_from_world = transpose(point.world_from_shading);
         CosineTransform diffuse = CosineTransform(shading_from_world, shading_from_world);
-        colours[1] = picture_average(picture, diffuse, light, view);
+        colours[1] = picture_average(picture, diffuse, light, view, true);
     }
 #endif
     return colours;

@@ -195,6 +195,20 @@ def test_other_numbers_of_taps(renderer, tmp_path, taps):
     assert np.max(error) <= 1e-2
 
 
+def test_diffuse_lobes_take_one_look_where_texels_are_nearly_square(renderer, tmp_path):
+    light = lamp(smooth_picture(tmp_path / "p.png", 64, 64))
+    laid = lay_pictures((light,), 0.0, 16384).pictures[0]
+    case = random_case(laid, 4, 500, (0.01, 1.0))
+    seen = renderer.probe(Scene(lights=(light,)), RenderSettings("ltc"), *case.inputs)["diffuse"]
+    plain = renderer.probe(
+        Scene(lights=(replace(light, picture=None),)), RenderSettings("ltc"), *case.inputs
+    )["diffuse"]
+    pyramid = pyramid_of(laid)
+    one, five = (plain * cosine_mean_radiance(pyramid, case.frames, n) for n in (1, TAPS))
+    assert np.max(np.abs(seen - one)) <= 2e-3
+    np.testing.assert_allclose(one, five, atol=1e-4)
+
+
 def test_half_vectors_are_nearer_the_truth_than_feet(renderer, tmp_path):
     """What the paper's place costs a diffuse surface, with the same levels.
 

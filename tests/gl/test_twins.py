@@ -73,6 +73,7 @@ GPU_ONLY = {
     "cosine_density": THROUGH_PICTURES,
     "fetched_picture": THROUGH_PICTURES,
     "picture_average": THROUGH_PICTURES,
+    "picture_look": THROUGH_PICTURES,
     "seen_pictures": THROUGH_PICTURES,
     "point_at": THROUGH_ADAPTIVE,
     "chord_angle": THROUGH_ADAPTIVE,
