@@ -143,7 +143,7 @@ def _alphas(pair: LobePair) -> str:
 
 def _view(pair: LobePair) -> str:
     theta, phi = math.degrees(pair.case.theta), math.degrees(pair.case.phi)
-    return f"θ {theta:.3g}°   φ {phi:.3g}°" if pair.case.is_anisotropic else f"θ {theta:.3g}°"
+    return f"θ {theta:.4g}°   φ {phi:.4g}°" if pair.case.is_anisotropic else f"θ {theta:.4g}°"
 
 
 class _Page:
@@ -200,13 +200,21 @@ class _Page:
             draw.line(places, fill=LINES[line.kind], width=line_width)
             if labelled and line.label and pixels >= 300:
                 self._label(draw, min(places, key=lambda place: place[1]), line.label)
+        picture.alpha_composite(overlay)
+        left, top = round(SAMPLES * x), round(SAMPLES * y)
+        self._image.alpha_composite(picture, (left, top))
+        # Marks may reach beyond the picture's edge, if their place is within it.
         r = max(pixels / 55.0, 4.0)
+        pad = 2 * round(r)
+        marked = Image.new("RGBA", (pixels + 2 * pad, pixels + 2 * pad), (0, 0, 0, 0))
+        draw = ImageDraw.Draw(marked)
         for mark in marks(pair.case):
             cx, cy = at(mark.x, mark.y)
-            for ink, extra in ((SHADE, 2 * line_width), (WHITE, 0)):
-                self._mark(draw, mark.name, cx, cy, r, ink, line_width + extra)
-        picture.alpha_composite(overlay)
-        self._image.alpha_composite(picture, (round(SAMPLES * x), round(SAMPLES * y)))
+            if 0.0 <= cx <= pixels and 0.0 <= cy <= pixels:
+                for ink, extra in ((SHADE, 2 * line_width), (WHITE, 0)):
+                    place = (cx + pad, cy + pad)
+                    self._mark(draw, mark.name, *place, r, ink, line_width + extra)
+        self._image.alpha_composite(marked, (left - pad, top - pad))
 
     def _label(self, draw: object, place: tuple[float, float], text: str) -> None:
         from PIL import ImageDraw, ImageFont

@@ -51,7 +51,7 @@ def lobe(
         typer.Option(
             "--pixels",
             metavar="N",
-            help="Width of one picture of a lobe. [default: 300; with --grid 96]",
+            help="Width of one picture of a lobe: 300, or 96 with --grid, unless given.",
             parser=whole_number("--pixels", 32, 2048),
             show_default=False,
         ),
@@ -59,10 +59,11 @@ def lobe(
 ) -> None:
     """Draw GGX's lobe, its transformed cosine, and their difference.
 
-    The disks show the hemisphere from above, equal solid angles as equal areas: x, the
-    tangent, to the right, the normal in the middle, the horizon as the rim. A circle
-    marks the view, a cross its mirror direction. Small lobes are shown a second time, larger.
-    Equal alphas are looked up in the isotropic table, others in the anisotropic one.
+    The disks show the hemisphere from above, equal solid angles as equal
+    areas: x, the tangent, to the right, the normal in the middle, the horizon
+    as the rim. A ring marks the view, a cross its mirror direction. Small lobes
+    are shown a second time, larger. Equal alphas are looked up in the
+    isotropic table, others in the anisotropic one.
 
     \b
     Examples:
