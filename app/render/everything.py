@@ -11,8 +11,7 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
-from app.render.features import LightingFeatures, LightNeeds
-from app.render.pack import TEXELS_PER_EDGE, TEXELS_PER_LIGHT, TEXELS_PER_NODE
+from app.render.features import LightingFeatures, LightNeeds, light_texels
 
 KEPT = {
     "count": "how many lights there are is the scene's",
@@ -40,9 +39,8 @@ def everything_on(features: LightingFeatures) -> LightingFeatures:
     # Edges as a flat list of curves that are straight, not as a tree: a tree takes chords
     # where they are within `CHORD_ERROR`, and the picture would change by as much.
     has_list = lights.curves == 1
-    texels = (TEXELS_PER_LIGHT + 1) * lights.count + (
-        TEXELS_PER_NODE if lights.curved or has_list else TEXELS_PER_EDGE
-    ) * lights.parts
+    curved = has_list or lights.curved
+    texels = light_texels(lights.count, lights.parts, curved, True, lights.pictures)
     forced_lights = _all_on(
         lights,
         {

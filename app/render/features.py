@@ -66,6 +66,12 @@ def _rounded(count: int) -> int:
     return max(16, 1 << (count - 1).bit_length()) if count else 0
 
 
+def light_texels(count: int, parts: int, curved: bool, bounded: bool, pictures: int) -> int:
+    """Return the records of lights with so many parts, that are nodes if ``curved``."""
+    size = TEXELS_PER_NODE if curved else TEXELS_PER_EDGE
+    return (TEXELS_PER_LIGHT + int(bounded)) * count + size * parts + TEXELS_PER_PICTURE * pictures
+
+
 @dataclass(frozen=True, slots=True)
 class LightNeeds:
     """The lights of a scene that reach surfaces.
@@ -108,10 +114,8 @@ class LightNeeds:
         bounded = bounded or choice.technique.is_sampled
         curved = not isinstance(curves, int)
         parts = sum(part_count(item, curves) for item in shining)
-        size = TEXELS_PER_NODE if curved else TEXELS_PER_EDGE
         pictures = sum(light.picture is not None for light in shining)
-        texels = (TEXELS_PER_LIGHT + int(bounded)) * len(lights) + size * parts
-        texels += TEXELS_PER_PICTURE * pictures
+        texels = light_texels(len(lights), parts, curved, bounded, pictures)
         if texels > limits.storage_texels:
             raise InputError(
                 f"lights: {len(lights)} lights with {parts} {'curves' if curved else 'edges'} "
@@ -191,6 +195,9 @@ class LightingFeatures:
         Lobes are looked up in the anisotropic tables, where the technique has tables.
     estimates_noise : bool
         Samples are random, so the picture tells how far off it is (`app.render.noise`).
+    mixed : bool
+        Some material lacks a lobe that another has: where it is seen, one lobe is integrated.
+        Only of ``ggx``, where the test is worth its while.
     """
 
     specular: bool
@@ -205,6 +212,7 @@ class LightingFeatures:
     anisotropic: bool
     culls: bool
     estimates_noise: bool
+    mixed: bool
 
     @classmethod
     def of(
@@ -217,7 +225,7 @@ class LightingFeatures:
         culls: bool = False,
     ) -> LightingFeatures:
         """Raise `InputError` if lights or objects are more than the machine can hold."""
-        culls = culls and find_technique(technique).culls
+        culls = culls and parse_technique(technique).skips_lobes
         lights = LightNeeds.of(scene.lights, limits, technique, culls)
         shines = lights.one_sided or lights.two_sided
         used = scene.object_materials()
@@ -253,6 +261,10 @@ class LightingFeatures:
             anisotropic,
             culls and (specular or diffuse),
             samples > 1 and find_technique(used_technique).is_sampled and view != "cost",
+            specular
+            and diffuse
+            and parse_technique(used_technique).name == "ggx"
+            and not all(any(material.f0) and any(material.diffuse) for material in used),
         )
 
     @property
@@ -277,7 +289,7 @@ class LightingFeatures:
 
     def defines(self) -> dict[str, int]:
         """Return the numbers that the lighting shaders are assembled with."""
-        lights = self.lights
+        lights, skips = self.lights, parse_technique(self.technique).skips_lobes
         if not self.shades:
             lights = replace(lights, one_sided=False, two_sided=False)
         return {
@@ -289,7 +301,8 @@ class LightingFeatures:
             "ESTIMATES_NOISE": int(self.estimates_noise),
             "COUNTS_EVALUATIONS": int(self.counts),
             "HAS_TANGENTS": int(self.tangents),
-            "CULLS": int(self.culls and find_technique(self.technique).culls),
+            "CULLS": int(self.culls and skips),
+            "MIXED_LOBES": int(self.mixed),
             **technique_defines(self.technique, self.anisotropic),
             **picture_defines(lights, self.technique),
             "MATERIAL_STORAGE_UNIFORM": int(self.uniform_materials > 0),
@@ -346,6 +359,7 @@ def probe_defines(lights: LightNeeds, technique: str, anisotropic: bool) -> dict
         "PROBES": 1,
         "COUNTS_EVALUATIONS": 0,
         "CULLS": 0,
+        "MIXED_LOBES": 0,
         **technique_defines(lights.technique(technique), anisotropic),
         **picture_defines(lights, technique),
         **lights.defines(),

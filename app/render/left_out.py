@@ -8,7 +8,7 @@ from app.render.features import LightingFeatures
 from app.render.light_shapes import curve_texels, has_triangles
 from app.render.needs import FORMAT_BYTES
 from app.render.tables import table_textures
-from app.render.techniques import find_technique
+from app.render.techniques import parse_technique
 from app.scene import TONE_MAPS, Shot
 
 
@@ -70,8 +70,12 @@ def left_out(shot: Shot, features: LightingFeatures) -> tuple[LeftOut, ...]:
         leave("light from back sides", "no light is two-sided")
     if features.shades and not lights.one_sided:
         leave("test for dark sides", "every light is two-sided")
+    both = all(any(material.f0) and any(material.diffuse) for material in used)
+    if features.specular and features.diffuse and not features.mixed:
+        why = "every material has both" if both else "walking both costs ltc no more"
+        leave("choice of lobes for each pixel", why)
     if features.shades and not features.culls:
-        can = find_technique(features.technique).culls
+        can = parse_technique(features.technique).skips_lobes
         leave(
             "bounds of faint lights",
             "no light is to be skipped (--cull)"

@@ -52,8 +52,9 @@ class Technique:
         The feature CURVE_RULE: how it integrates along curves that are whole.
     has_own_diffuse : bool
         Whether its diffuse part differs from the form factors that the others share.
-    culls : bool
-        Whether it can skip lights that a bound puts below what can be seen.
+    skips_lobes : bool
+        Whether it can leave out a light's lobe at a point: where the material has none, and
+        where a bound puts it below what can be seen.
     parameter : Parameter, optional
         What a number behind its name means.
     """
@@ -64,7 +65,7 @@ class Technique:
     curves: Literal["tree", "whole", "edges"] = "tree"
     curve_rule: int = 0
     is_sampled: bool = False
-    culls: bool = False
+    skips_lobes: bool = False
     has_own_diffuse: bool = False
     parameter: Parameter | None = None
 
@@ -76,7 +77,7 @@ TECHNIQUES: dict[str, Technique] = {
         anisotropic=True,
         has_tables=True,
         parameter=Parameter("quadrature nodes a panel of a curve", 2, 6, 4),
-        culls=True,
+        skips_lobes=True,
     ),
     "ggx": Technique(
         "GGX itself as a contour integral in half-vector space, anisotropic, without tables; "
@@ -84,7 +85,7 @@ TECHNIQUES: dict[str, Technique] = {
         anisotropic=True,
         has_tables=False,
         parameter=Parameter("quadrature nodes an edge", 1, 4, 2),
-        culls=True,
+        skips_lobes=True,
     ),
     "adaptive": Technique(
         "ltc with curves halved until triangles between chords add little, as published by Kuge "
@@ -93,7 +94,7 @@ TECHNIQUES: dict[str, Technique] = {
         has_tables=True,
         curves="whole",
         curve_rule=1,
-        culls=True,
+        skips_lobes=True,
     ),
     "adaptive-extrapolated": Technique(
         "adaptive with the same chords, extrapolated to the curve",
@@ -101,7 +102,7 @@ TECHNIQUES: dict[str, Technique] = {
         has_tables=True,
         curves="whole",
         curve_rule=2,
-        culls=True,
+        skips_lobes=True,
     ),
     "uniform": Technique(
         "ltc with every curve cut into the same number of edges",
@@ -109,7 +110,7 @@ TECHNIQUES: dict[str, Technique] = {
         has_tables=True,
         curves="edges",
         parameter=Parameter("edges a curve", 1, 4096, 18),
-        culls=True,
+        skips_lobes=True,
     ),
     "reference": Technique(
         "GGX and Lambert estimated by random directions, without bias but with noise: what "
@@ -214,6 +215,11 @@ class Choice(NamedTuple):
     name: str
     number: int | None
     variant: str = ""
+
+    @property
+    def skips_lobes(self) -> bool:
+        """Whether lobes of lights can be left out at a point; not by what was published."""
+        return self.technique.skips_lobes and not self.changes.cuts_at_lobe
 
     @property
     def changes(self) -> Variant:

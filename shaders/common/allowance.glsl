@@ -12,15 +12,11 @@ void allow_for_a_light()
     allowance += allowance_per_light;
 }
 
-// Whether a contribution of at most `most` is skipped; then that is used up.
+// Whether a contribution of at most `most` is skipped; then that is used up. Where nothing is
+// allowed nothing is skipped, not even nothing.
 bool is_skipped(float most)
 {
-    bool skipped = most <= allowance;
+    bool skipped = allowance > 0.0 && most <= allowance;
     allowance -= skipped ? most : 0.0;
     return skipped;
-}
-
-float greatest(vec3 v)
-{
-    return max(v.x, max(v.y, v.z));
 }

@@ -10,6 +10,7 @@
 #include "ggx/polygon.glsl"
 #endif
 #if CULLS
+#include "common/greatest.glsl"
 #include "ggx/bound.glsl"
 #endif
 #if HAS_PICTURES
@@ -31,7 +32,7 @@ struct GgxTerms {
 
 GgxTerms ggx_terms(
     PlanarLight light, vec3 position, mat3 world_from_tangent, vec3 wo_tangent, vec2 alpha
-#if CULLS
+#if CULLS || MIXED_LOBES
     , MaterialSample material
 #endif
     )
@@ -50,6 +51,10 @@ GgxTerms ggx_terms(
 #if HAS_DIFFUSE
     CosineTransform diffuse = CosineTransform(tangent_from_world, tangent_from_world);
 #endif
+#if CULLS || MIXED_LOBES
+    // What the material has not got, and then what is too faint.
+    bvec2 skipped = bvec2(material.f0 == vec3(0.0), material.diffuse == vec3(0.0));
+#endif
 #if CULLS
     vec2 half_sides;
     vec3 to_middle = way_to_rectangle(light, plane, half_sides);
@@ -58,20 +63,30 @@ GgxTerms ggx_terms(
     if (wo_tangent.z > 0.0) {
         GgxView view = ggx_view(wo_tangent, alpha);
 #if CULLS
-        vec2 most = ggx_bound(tangent_from_world * to_middle,
-                              half_sides.x * (tangent_from_world * light.u),
-                              half_sides.y * (tangent_from_world * light.v), view);
-        // f0 (1 - (1 - wo.h)^5) + (1 - wo.h)^5, at most.
-        vec3 fresnel = mix(material.f0, vec3(1.0), most.y);
-        if (!is_skipped(most.x * greatest(light.radiance * fresnel)))
+        if (!skipped.x) {
+            vec2 most = ggx_bound(tangent_from_world * to_middle,
+                                  half_sides.x * (tangent_from_world * light.u),
+                                  half_sides.y * (tangent_from_world * light.v), view);
+            // f0 (1 - (1 - wo.h)^5) + (1 - wo.h)^5, at most.
+            vec3 fresnel = mix(material.f0, vec3(1.0), most.y);
+            skipped.x = is_skipped(most.x * greatest(light.radiance * fresnel));
+        }
+#endif
+#if CULLS || MIXED_LOBES
+        if (!skipped.x)
 #endif
         terms.specular = ggx_light_specular(light, plane, normal, tangent_from_world, view);
     }
 #endif
 #if HAS_DIFFUSE
 #if CULLS
-    if (!is_skipped(greatest(light.radiance * material.diffuse) *
-                    form_factor_bound(diffuse, light, to_middle, half_sides)))
+    if (!skipped.y) {
+        skipped.y = is_skipped(greatest(light.radiance * material.diffuse) *
+                               form_factor_bound(diffuse, light, to_middle, half_sides));
+    }
+#endif
+#if CULLS || MIXED_LOBES
+    if (!skipped.y)
 #endif
     // A point on the outline itself has no defined form factor, but not above 1.
     terms.diffuse = clamp(
@@ -112,6 +127,8 @@ vec3 shade_lights(
         PlanarLight light = light_at(i);
 #if CULLS
         allow_for_a_light();
+#endif
+#if CULLS || MIXED_LOBES
         GgxTerms terms = ggx_terms(
             light, position, world_from_tangent, wo_tangent, material.alpha, material);
 #else

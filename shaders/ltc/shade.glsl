@@ -6,6 +6,7 @@
 #include "common/material.glsl"
 #include "ltc/contour.glsl"
 #if CULLS
+#include "common/greatest.glsl"
 #include "ltc/bound.glsl"
 #endif
 #if TAKES_TANGENT
@@ -93,8 +94,14 @@ vec2 form_factors_at(
 #endif
 #if HAS_CURVES && HAS_SPECULAR && HAS_DIFFUSE && !CURVE_RULE
 #if CULLS
-    if (skipped.x) {
-        factors.y = light_form_factor(light, diffuse, view, normal);
+    if (any(skipped)) {
+        // One walk in the text for whichever it is.
+        CosineTransform only = diffuse;
+        if (skipped.y) {
+            only = specular;
+        }
+        float factor = light_form_factor(light, only, view, normal);
+        factors = skipped.y ? vec2(factor, 0.0) : vec2(0.0, factor);
     } else
 #endif
     factors = light_form_factors(light, specular, diffuse, view, normal);

@@ -89,6 +89,7 @@ FEATURES = {
     "HAS_PICTURES": 0,
     "PROBES": 1,
     "CULLS": 0,
+    "MIXED_LOBES": 0,
     "GGX_NODES": 2,
 }
 

@@ -331,6 +331,7 @@ PAIRED = {
     "HAS_ONE_SIDED": (0, 1),
     "HAS_TWO_SIDED": (0, 1),
     "CULLS": (0, 1),
+    "MIXED_LOBES": (0, 1),
     "LIGHT_TEXELS": (0, 64),
     "MATERIAL_TEXELS": (0, 16),
 }

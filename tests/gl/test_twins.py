@@ -34,6 +34,7 @@ FEATURES = {
     "HAS_PICTURES": 0,
     "PROBES": 1,
     "CULLS": 0,
+    "MIXED_LOBES": 0,
 }
 NO_LIGHTS = "vec4 light_texel(int index) { return vec4(0.0); }"
 COUNT = 4096
