@@ -175,7 +175,8 @@ def test_it_is_left_out_unless_asked_for(renderer) -> None:
     culls = renderer.plan(Shot(scene, RenderSettings("ltc", cull=1 / 1024), *SIZE))
     files = [{name for program in plan.programs for name in program.files}
              for plan in (plain, culls)]  # fmt: skip
-    extra = {"common/allowance.glsl", "common/light_rectangle.glsl", "ltc/bound.glsl"}
+    extra = {"common/allowance.glsl", "common/greatest.glsl", "common/light_rectangle.glsl",
+             "ltc/bound.glsl"}  # fmt: skip
     assert files[1] - files[0] == extra
     assert plain.allocated["lights"] <= culls.allocated["lights"]
     assert any(left.what == "bounds of faint lights" for left in plain.left_out)
