@@ -103,13 +103,13 @@ HalfVectorNode half_vector_node(GgxLight light, PowerCurve curve, GgxView view, 
     return node;
 }
 
-// Whether the panel's poles, seen from its outer nodes, let four nodes do; else halve it.
+// Whether the poles of a panel, whose curve is about its middle, let four nodes do, seen from its
+// outer ones; else halve it.
 bool is_panel_ready(GgxLight light, PowerCurve curve, GgxView view, Panels panels)
 {
-    float middle = panel_middle(panels);
     float off = OUTER.x * panels.half_width;
-    vec2 first = half_vector_node(light, curve, view, middle - off).pole;
-    vec2 last = half_vector_node(light, curve, view, middle + off).pole;
+    vec2 first = half_vector_node(light, curve, view, -off).pole;
+    vec2 last = half_vector_node(light, curve, view, off).pole;
     float ellipse = min(pole_ellipse(first / panels.half_width - vec2(OUTER.x, 0.0)),
                         pole_ellipse(last / panels.half_width + vec2(OUTER.x, 0.0)));
     return ellipse >= FAR_POLE || panels.halvings >= MOST_HALVINGS;
@@ -121,8 +121,7 @@ FanNode curve_fan_node(
 {
     vec2 place = i < 2 ? OUTER : SECOND;
     float side = (i & 1) == 0 ? -panels.half_width : panels.half_width;
-    HalfVectorNode node =
-        half_vector_node(light, curve, view, panel_middle(panels) + side * place.x);
+    HalfVectorNode node = half_vector_node(light, curve, view, side * place.x);
     float weight = panels.half_width * place.y;
     float inverse2 = 1.0 / max(dot(node.h, node.h), 1e-30);
     integral = (weight * inverse2) * cross(node.h, node.dh);

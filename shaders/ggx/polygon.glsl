@@ -281,9 +281,10 @@ vec2 ggx_light_specular(
                 continue;
             }
             if (part.is_curve) {
-                PowerCurve curve = power_curve(part.curve);
+                PowerCurve whole = power_curve(part.curve);
                 Panels panels = panels_of(part.from, part.to);
                 while (has_panel(panels)) {
+                    PowerCurve curve = panel_curve(whole, panels);
                     if (!is_panel_ready(about, curve, view, panels)) {
                         halve_panel(panels);
                         continue;

@@ -146,6 +146,25 @@ struct ContourPart {
     bool is_curve;
 };
 
+// Where the curve of the node where the walk is meets the horizon, about at t.
+vec2 horizon_place(
+    PlanarLight light, CosineLight anchored, Contour contour, PlanarCurve curve, float t)
+{
+    PowerCurve power = power_curve(curve);
+#if CURVE_RULE
+    return curve_point(power, t);
+#else
+    int texel = light.first_part + 4 * contour.next;
+    vec2 place = accurate_place(anchored, light_texel(texel), light_texel(texel + 1),
+                                vec4(curve.a_handle, curve.b_handle), t);
+    // A curve that only touches the horizon stays where it is.
+    vec2 way = curve_way(power, t);
+    float rise = dot(contour.slope, way);
+    float step = -height_of(contour, place) / (abs(rise) > 1e-30 ? rise : 1e-30);
+    return abs(step) < 1e-6 ? place + step * way : place;
+#endif
+}
+
 // What of the node where the walk is lies above the surface, as its chord or as a curve;
 // false if nothing.
 bool contour_part(
@@ -167,7 +186,8 @@ bool contour_part(
     bool above = contour.from > 0.0 ? contour.above : z.x > 0.0;
     part.to = next_crossing(z, part.from, 1.0, above);
     if (part.to < 1.0) {
-        meet_horizon(contour, curve_point(power_curve(part.curve), part.to), above);
+        meet_horizon(
+            contour, horizon_place(light, anchored, contour, part.curve, part.to), above);
         // Not 0 again, which would be the curve's start.
         contour.from = max(part.to, 1e-7);
         contour.above = !above;

@@ -296,6 +296,23 @@ def test_a_receding_round_light_never_goes_out(renderer, technique):
     assert np.max(np.abs(np.diff(np.log(seen[distance > 30.0])))) <= 5e-3
 
 
+@pytest.mark.parametrize("distance, largest", [(1e-3, LARGEST), (1e-4, LARGEST), (1e-5, 3e-3),
+                                               (1e-6, 2e-2)])  # fmt: skip
+def test_close_to_a_curve(renderer, distance, largest):
+    """Panels meet within 6e-8 of the curve's length, 1 m here, which is felt as near as that."""
+    rng = np.random.default_rng(12)
+    for outline in (heart(), letter("&")):
+        lamp = lamp_of(outline, plane_of(rng))
+        curves = np.concatenate(boundary(outline))
+        place = evaluate(curves[rng.integers(0, len(curves), 200)], rng.uniform(size=200))
+        position = lamp_points(lamp, place) + distance * unit(rng.normal(size=(200, 3)))
+        points = random_points(rng, 200, position, alpha=(0.05, 1.0))
+        for got, want in zip(probe(renderer, lamp, points), reference(lamp, points), strict=True):
+            # In between lies whether a point this near is in front of the curve or behind.
+            wobble = 4.0 * 6e-8 / distance
+            assert np.max(np.abs(got - want)) <= largest + wobble
+
+
 def curve(*points: tuple[float, float]) -> FloatArray:
     return np.array(points, dtype=np.float64)
 
