@@ -233,6 +233,8 @@ def compare(
     largest = np.array([[bounds[0].largest], [bounds[1].largest]])
     roundings = np.array([[bounds[0].roundings], [bounds[1].roundings]])
     least = least_seen(choice, case.curved)
+    if excepted:
+        least = max(least, bounds[0].largest)
     lost = (found == 0.0) & (own > least)
     if sampled:
         largest = largest + RARE / samples
@@ -422,18 +424,21 @@ def measure_case(
     """Add what a technique gives in a case to its rows, specular and diffuse."""
     case, choice = truth.case, parse_technique(technique)
     result = compare(renderer, truth, technique, sampling.samples)
-    relaxed: Comparison | None = None
+    named = [exception_of(choice, case.sweep, case.curved, quantity) for quantity in QUANTITIES]
+    relaxed = result
+    beyond = result.excess is not None and bool(np.any(result.excess > 0.0))
+    if any(named) and (beyond or np.any(result.lost_light)):
+        relaxed = compare(renderer, truth, technique, sampling.samples, excepted=True)
     for q, row in enumerate(rows):
         row.samples += len(case.points)
-        counts = (result.non_finite, result.impossible, result.false_light, result.lost_light)
-        for name, flags in zip(
-            ("non_finite", "impossible", "false_light", "lost_light"), counts, strict=True
-        ):
-            count = int(np.count_nonzero(flags[q]))
+        exception = named[q]
+        for name in ("non_finite", "impossible", "false_light", "lost_light"):
+            flags = getattr(relaxed, name)[q]
+            count = int(np.count_nonzero(flags))
             setattr(row, name, getattr(row, name) + count)
             if count:
                 row.violated = True
-                where = np.flatnonzero(flags[q])[:1]
+                where = np.flatnonzero(flags)[:1]
                 _note(row, Worst.of(case, where, name.replace("_", " "), math.inf, result))
         if result.error is None:
             if choice.name in UNBOUNDED:
@@ -448,14 +453,11 @@ def measure_case(
         _note(row, Worst.of(case, np.array([index]), "error", worst, result))
         over = int(np.count_nonzero(result.excess[q] > 0.0))
         row.beyond += over
-        named = exception_of(choice, case.sweep, case.curved, QUANTITIES[q])
         if over:
-            if named is not None and relaxed is None:
-                relaxed = compare(renderer, truth, technique, sampling.samples, excepted=True)
-            inside = relaxed is not None and relaxed.excess is not None and named is not None
-            if inside and bool(np.all(relaxed.excess[q] <= 0.0)):  # type: ignore[union-attr,index]
+            assert relaxed.excess is not None
+            if exception is not None and bool(np.all(relaxed.excess[q] <= 0.0)):
                 row.excepted = True
-                row.causes.append(named.reason)  # type: ignore[union-attr]
+                row.causes.append(exception.reason)
             else:
                 row.violated = True
         if result.jump is None:
@@ -473,9 +475,9 @@ def measure_case(
         if excess > 0.0:
             row.beyond += 1
             _note(row, Worst.of(place, np.array([at - 1, at]), "jump", excess, fine))
-            if named is not None and jump <= named.jump:
+            if exception is not None and jump <= exception.jump:
                 row.excepted = True
-                row.causes.append(named.reason)
+                row.causes.append(exception.reason)
             else:
                 row.violated = True
     specular = rows[0]
