@@ -80,7 +80,7 @@ def test_scenes_that_commands_name_exist() -> None:
         for word in words[2:]:
             if re.match(r"\d\d-", word):
                 assert word in demo_scenes(), word
-            if "/" in word:
+            if "/" in word and not re.fullmatch(r"\d+/\d+", word):
                 assert list(ROOT.glob(word)), word
 
 
