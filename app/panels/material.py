@@ -43,6 +43,10 @@ PRESETS: tuple[tuple[str, str, Material], ...] = (
      Material("", (0.0, 0.0, 0.0), (1.0, 0.71, 0.29), (0.04, 0.04))),
     ("Copper", "Worn copper",
      Material("", (0.0, 0.0, 0.0), (0.95, 0.64, 0.54), (0.16, 0.16))),
+    ("Mirror", "Silver, polished",
+     Material("", (0.0, 0.0, 0.0), (0.97, 0.96, 0.91), (0.001, 0.001))),
+    ("Clay", "Fired, without glaze",
+     Material("", (0.45, 0.18, 0.10), (0.04, 0.04, 0.04), (0.36, 0.36))),
 )  # fmt: skip
 """Name, tooltip and values; f0 of metals from Akenine-Möller et al. 2018, table 9.2."""
 
