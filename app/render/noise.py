@@ -4,7 +4,7 @@ Even and odd samples of a pixel run through two sequences that are scrambled apa
 (`ltc.sequence`), so their means A and B are independent estimates with the same error, and
 (A - B)^2 / 4 is an unbiased estimate of the variance of the picture (A + B) / 2. It counts
 whatever low-discrepancy points gain, which the spread of single samples does not know of: that
-would say six times too much after 1,024 samples. Of one pixel it says little, of
+would say seven times too much after 1,024 samples. Of one pixel it says little, of
 thousands it says the picture's error to a few per cent.
 
 What it measures is the noise of reflected light. Edges, which samples smooth at places that
