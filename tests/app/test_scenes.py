@@ -30,6 +30,7 @@ def test_there_are_enough() -> None:
         "lights-08",
         "lights-32",
         "quad",
+        "quad-brushed",
         "ngon-40",
         "star-10",
         "letter-16-curves",
