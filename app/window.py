@@ -218,9 +218,10 @@ class Window:
         self._update_title()
         with self.messages.guard():
             self.measuring.step(self.renderer.ctx)
-        works = (self.measuring, self.inspector, self.exports)
-        is_busy = any(work.is_busy for work in works) or self.viewport.playback.is_moving
-        if is_busy or not (self.viewport.is_idle and self.lobe.is_settled):
+        others = (self.measuring, self.exports)
+        is_busy = any(work.is_busy for work in others) or self.viewport.playback.is_moving
+        works = (self.viewport, self.inspector)
+        if is_busy or not self.lobe.is_settled or any(work.needs_frames for work in works):
             hello_imgui.request_refresh()
 
     def _ask_about_unsaved(self) -> None:

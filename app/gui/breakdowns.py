@@ -52,6 +52,11 @@ class BreakdownWork:
         return self._gathering is not None or self._future is not None
 
     @property
+    def needs_frames(self) -> bool:
+        """Whether it goes on with every frame; the rest is computed aside."""
+        return self._gathering is not None
+
+    @property
     def progress(self) -> str:
         """What is being done, empty if nothing is."""
         if self._gathering is not None:

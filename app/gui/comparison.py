@@ -59,7 +59,7 @@ class _Side:
         self.colours: moderngl.Texture | None = None
 
     def release(self) -> None:
-        self.worker.shutdown(wait=True, cancel_futures=True)
+        self.worker.shutdown(wait=False, cancel_futures=True)
         self.differences.release()
         self.renderer.release()
 
@@ -127,6 +127,13 @@ class Comparison:
             return False
         source = self._source()
         return source is None or self._is_summed(source)
+
+    @property
+    def needs_frames(self) -> bool:
+        """Whether it goes on with every frame: what is computed aside only gets in their way."""
+        side = self._side
+        is_settled = side.picture.is_settled(self._pixels) if side is not None else not self.is_on
+        return not is_settled or self.parts.needs_frames
 
     @property
     def is_summed(self) -> bool:

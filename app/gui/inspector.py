@@ -74,6 +74,11 @@ class Inspector:
     def is_busy(self) -> bool:
         return self.parts.is_busy
 
+    @property
+    def needs_frames(self) -> bool:
+        """Whether it goes on with every frame."""
+        return self.parts.needs_frames
+
     def step(self) -> None:
         """Go on with what takes longer than a frame."""
         self.parts.step(self._viewport.picture)
@@ -148,10 +153,10 @@ class Inspector:
             a, b = (np.array(values) for values in numbers.radiance)
             rows.append(_radiance_row("A − B", a - b))
         title, facts = _surface(hit, shot.scene)
-        facts += [
-            (f"evaluations {side}", str(count))
-            for side, count in zip("AB", numbers.evaluations, strict=False)
-        ]
+        counts = [str(count) for count in numbers.evaluations]
+        both = zip("AB", counts, strict=False)
+        text = ", ".join(f"{side} {count}" for side, count in both) if counts[1:] else counts[0]
+        facts.append(("evaluations", text))
         is_surface = hit is not None and hit.kind == "object"
         parts = self._parts(numbers) if is_surface else None
         return Pixel(title, note, tuple(rows), tuple(facts), parts)
@@ -180,13 +185,18 @@ def pixel_rows(found: Breakdown) -> tuple[PartRow, ...]:
     exact = float(found.exact[0] @ weights)
 
     def row(name: str, value: float) -> PartRow:
-        share = f"{100.0 * value / exact:+.3g} %" if exact > 0.0 else ""
-        return PartRow(name, (f"{value:+.3g}", share))
+        share = f"{signed(100.0 * value / exact)} %" if exact > 0.0 else ""
+        return PartRow(name, (signed(value), share))
 
     shares = zip(found.parts, found.shares[:, 0] @ weights, strict=True)
     rows = [row(name, float(value)) for name, value in shares]
     whole = row("all", float(found.total[0] @ weights))
     return (PartRow("exact", (f"{exact:.6g}", "")), *rows, whole)
+
+
+def signed(value: float) -> str:
+    """Return a number with its sign, 0 without."""
+    return f"{value:+.3g}" if value else "0"
 
 
 def _radiance_row(name: str, values: np.ndarray) -> RadianceRow:

@@ -134,11 +134,11 @@ def view_parts(work: BreakdownWork, picture: LivePicture) -> Parts:
     about, found = work.problem, work.result
     if found is not None:
         rows = tuple(
-            PartRow(name, (f"{mean:.2g}", f"{p95:.2g}", f"{most:.2g}", f"{bias:+.2g}"))
-            for name, mean, p95, most, bias in found.rows()
+            PartRow(name, tuple(f"{value:.2g}" for value in (mean, most, bias)))
+            for name, mean, _, most, bias in found.rows()
         )
         about = f"{found.technique} at {len(found.exact)} random pixels' points: luminance"
     return Parts(
-        about, ("mean", "p95", "max", "bias"), rows, work.is_of(picture), work.progress,
+        about, ("mean", "max", "bias"), rows, work.is_of(picture), work.progress,
         refusal(picture),
     )  # fmt: skip

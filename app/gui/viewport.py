@@ -114,6 +114,11 @@ class Viewport:
         """Whether nothing is left to do until the user does something."""
         return self.is_settled and not self._is_asking and self.comparison.is_idle
 
+    @property
+    def needs_frames(self) -> bool:
+        """Whether frames shall follow each other as fast as they can."""
+        return not self.is_settled or self._is_asking or self.comparison.needs_frames
+
     def frame(self, editor: Editor) -> None:
         """Turn the camera's attention to what is selected, or to the whole scene."""
         sphere = sphere_around(editor.scene, editor.selection)
