@@ -11,7 +11,7 @@ import numpy as np
 from app.gui.breakdowns import BreakdownWork, refusal
 from app.gui.shortcuts import key_of
 from app.gui.viewport import Viewport
-from app.panels.inspector import Pixel, RadianceRow, inspector_panel
+from app.panels.inspector import Pixel, inspector_panel
 from app.panels.parts import PartRow, Parts
 from app.render.breakdown import Breakdown
 from app.render.difference import LUMINANCE
@@ -144,14 +144,12 @@ class Inspector:
         x, y = numbers.key.place
         how = "pinned" if self._viewport.pin is not None else "under the pointer"
         note = f"Pixel {int(x)}, {int(y)} of {shot.width} × {shot.height}, {how}"
-        names = self._names()
-        rows = [
-            _radiance_row(f"{side} {name}".strip(), np.array(values))
-            for side, name, values in zip("AB", names, numbers.radiance, strict=False)
-        ]
-        if len(numbers.radiance) > 1:
-            a, b = (np.array(values) for values in numbers.radiance)
-            rows.append(_radiance_row("A − B", a - b))
+        names = zip("AB", self._names(), strict=True)
+        values = [np.array(side) for side in numbers.radiance]
+        sides = tuple(f"{side} {name}".strip() for side, name in names)[: len(values)]
+        if len(values) > 1:
+            values.append(values[0] - values[1])
+            sides = (*sides, "A − B")
         title, facts = _surface(hit, shot.scene)
         counts = [str(count) for count in numbers.evaluations]
         both = zip("AB", counts, strict=False)
@@ -159,7 +157,7 @@ class Inspector:
         facts.append(("evaluations", text))
         is_surface = hit is not None and hit.kind == "object"
         parts = self._parts(numbers) if is_surface else None
-        return Pixel(title, note, tuple(rows), tuple(facts), parts)
+        return Pixel(title, note, sides, _radiance_rows(values), tuple(facts), parts)
 
     def _names(self) -> tuple[str, ...]:
         comparison = self._viewport.comparison
@@ -199,10 +197,13 @@ def signed(value: float) -> str:
     return f"{value:+.3g}" if value else "0"
 
 
-def _radiance_row(name: str, values: np.ndarray) -> RadianceRow:
-    luminance = float(values @ np.array(LUMINANCE))
-    red, green, blue, all_three = (f"{value:.6g}" for value in (*values.tolist(), luminance))
-    return RadianceRow(name, (red, green, blue, all_three))
+def _radiance_rows(sides: list[np.ndarray]) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the rows of a table whose columns are radiances (3,)."""
+    table = [[*side.tolist(), float(side @ np.array(LUMINANCE))] for side in sides]
+    names = ("red", "green", "blue", "lum.")
+    return tuple(
+        (name, tuple(f"{side[row]:.6g}" for side in table)) for row, name in enumerate(names)
+    )
 
 
 def _surface(hit: Hit | None, scene: Scene) -> tuple[str, list[tuple[str, str]]]:

@@ -11,14 +11,6 @@ from app.panels.widgets import MUTED, button, heading, hint
 
 
 @dataclass(frozen=True, slots=True)
-class RadianceRow:
-    """A line of the table of radiance: red, green, blue and luminance, linear Rec. 709."""
-
-    name: str
-    values: tuple[str, str, str, str]
-
-
-@dataclass(frozen=True, slots=True)
 class Pixel:
     """What the panel shows.
 
@@ -26,7 +18,8 @@ class Pixel:
     ----------
     title : what is seen there
     note : where the pixel is, and how it was chosen
-    radiance : tuple of RadianceRow
+    sides : names of the columns of radiance
+    radiance : (name, values by side): red, green, blue and luminance, linear Rec. 709
     facts : (name, text) of the surface
     parts : Parts or None
         Of the error of A at its middle; None where no surface is.
@@ -34,18 +27,15 @@ class Pixel:
 
     title: str
     note: str
-    radiance: tuple[RadianceRow, ...]
+    sides: tuple[str, ...]
+    radiance: tuple[tuple[str, tuple[str, ...]], ...]
     facts: tuple[tuple[str, str], ...]
     parts: Parts | None
 
     def text(self) -> str:
         """Return everything as lines, columns by tabs."""
-        lines = [
-            self.title,
-            self.note,
-            "\t".join(("radiance", "red", "green", "blue", "luminance")),
-        ]
-        lines += ["\t".join((row.name, *row.values)) for row in self.radiance]
+        lines = [self.title, self.note, "\t".join(("radiance", *self.sides))]
+        lines += ["\t".join((name, *values)) for name, values in self.radiance]
         lines += ["\t".join(fact) for fact in self.facts]
         if self.parts is not None and self.parts.rows:
             lines.append("\t".join(("part of the error", *self.parts.heads)))
@@ -67,13 +57,13 @@ def inspector_panel(pixel: Pixel | None, pin_key: str) -> bool:
         imgui.set_clipboard_text(pixel.text())
     heading("Radiance")
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop
-    if imgui.begin_table("radiance", 5, flags):
-        for head in ("", "red", "green", "blue", "lum."):
+    if imgui.begin_table("radiance", 1 + len(pixel.sides), flags):
+        for head in ("", *pixel.sides):
             imgui.table_setup_column(head)
         imgui.table_headers_row()
-        for row in pixel.radiance:
+        for name, values in pixel.radiance:
             imgui.table_next_row()
-            for cell in (row.name, *row.values):
+            for cell in (name, *values):
                 imgui.table_next_column()
                 imgui.text(cell)
         imgui.end_table()
