@@ -28,7 +28,7 @@ from app.stability.sweeps import make_sweeps
 
 MAX_POINTS = 1_000_000
 MAX_SEED = 2**31 - 1
-QUICK = Sampling(points=120, steps=48, compared=16, samples=256)
+QUICK = Sampling(points=60, steps=24, compared=10, samples=256)
 """With ``--quick``: half a minute on two cores."""
 
 SHOWN = 12
@@ -52,7 +52,7 @@ def stability(
             metavar="N",
             help="Points a sweep; a series has fewer.",
             parser=whole_number("--points", 1, MAX_POINTS),
-            show_default="2000",
+            show_default="800",
         ),
     ] = None,
     seed: Annotated[

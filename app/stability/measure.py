@@ -54,10 +54,10 @@ class Sampling:
     ``samples`` are a sampled technique's estimates of a point, a multiple of `BATCHES`.
     """
 
-    points: int = 2000
-    steps: int = 300
-    compared: int = 160
-    samples: int = 1024
+    points: int = 800
+    steps: int = 160
+    compared: int = 100
+    samples: int = 512
     seed: int = 0
 
 
@@ -201,7 +201,7 @@ def compare(
     renderer: Renderer,
     truth: Truth,
     technique: str,
-    samples: int = 1024,
+    samples: int = 512,
     excepted: bool = False,
 ) -> Comparison:
     """Shade a case by a technique and hold it against its definition and bound.
