@@ -216,10 +216,10 @@ def compare(
     sampled = choice.technique.is_sampled
     found, deviation = _shade(renderer, case, technique, samples if sampled else 0)
     with np.errstate(invalid="ignore"):
-        most = (MOST if case.defined else MOST_ON_OUTLINE) + (8.0 * deviation + RARE / samples) * (
-            1.0 if sampled else 0.0
-        )
-        impossible = (found < 0.0) | (found > (np.inf if choice.name in UNBOUNDED else most))
+        # A sampled technique's noise may go beyond, and below 0 where it estimates a difference.
+        noise = 8.0 * deviation + RARE / samples if sampled else np.zeros(found.shape)
+        most = np.inf if choice.name in UNBOUNDED else MOST if case.defined else MOST_ON_OUTLINE
+        impossible = (found < -noise) | (found > most + noise)
         false_light = truth.dark & (found > 0.0)
     bad = ~np.isfinite(found)
     definition = definition_of(choice, truth.seen)
