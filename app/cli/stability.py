@@ -23,7 +23,8 @@ from app.errors import InputError, expected_one_of
 from app.files import replace_file
 from app.render.techniques import AUTOMATIC, TECHNIQUES, parse_technique
 from app.stability.bounds import bound_of
-from app.stability.measure import Row, Sampling, compared_techniques, measure
+from app.stability.cases import Sampling, compared_techniques
+from app.stability.measure import Row, measure
 from app.stability.sweeps import make_sweeps
 
 MAX_POINTS = 1_000_000

@@ -9,7 +9,7 @@ from typing import Any
 from app.cli.html_page import facts_table, html_page, sortable_table
 from app.render.techniques import TECHNIQUES, parse_technique
 from app.stability.bounds import DEVIATIONS, EXCEPTIONS, QUANTITIES, UNBOUNDED, Bound, bound_of
-from app.stability.measure import compared_techniques
+from app.stability.cases import compared_techniques
 from app.stability.sweeps import Sweep
 
 Figures = Mapping[str, Any]

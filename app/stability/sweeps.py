@@ -8,25 +8,31 @@ Numbers are low-discrepancy in ``ltc-viewer stability`` and drawn by hypothesis 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.special import ndtri
 
-from app.curves import evaluate
-from app.outline import boundary
 from app.presets import heart, ring
 from app.scene import ALPHA_MIN, AreaLight, Outline, Plane
+from app.stability.clouds import (
+    STEEPEST,
+    Placing,
+    Ranges,
+    aimed,
+    along_normal,
+    at_quadrants,
+    behind,
+    beside,
+    in_plane,
+    on_floor,
+    on_vertex,
+)
 from app.stability.lights import (
     POLYGONS,
     SQUARE,
     STAR,
     THIN,
-    control_points,
     curved,
     lamp,
     letter,
@@ -34,15 +40,20 @@ from app.stability.lights import (
     random_plane,
     random_polygon,
 )
-from app.stability.points import FloatArray, Points, across, unit
-
-DIMENSIONS = 12
-"""Numbers that a point of a cloud is made from."""
-
-STEEPEST = 89.9
-"""Of the views' angles from the normal [degrees]."""
-
-Placing: TypeAlias = Callable[[FloatArray], Points]
+from app.stability.paths import (
+    WALL,
+    grazing,
+    passing,
+    past_edge,
+    receding,
+    rising,
+    sharpening,
+    stretching,
+    through_equal,
+    through_normal,
+    through_plane,
+    turning,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,308 +88,6 @@ class Sweep:
     series: tuple[Series, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Ranges:
-    """From where to where clouds go.
-
-    ``alpha`` logarithmic, ``theta`` of the view [degrees], ``distance`` from the light in its
-    sizes, logarithmic; ``edge`` is the share of lobes that point at the outline itself, ``ratio``
-    the smallest of the two alphas, the larger being in ``alpha``.
-    """
-
-    alpha: tuple[float, float] = (1e-3, 1.0)
-    theta: tuple[float, float] = (0.0, 80.0)
-    distance: tuple[float, float] = (0.03, 10.0)
-    edge: float = 0.5
-    ratio: float = 1.0
-
-
-def _log(u: FloatArray, limits: tuple[float, float]) -> FloatArray:
-    return np.asarray(np.exp(np.log(limits[0]) + u * np.log(limits[1] / limits[0])))
-
-
-def _linear(u: FloatArray, limits: tuple[float, float]) -> FloatArray:
-    return np.asarray(limits[0] + u * (limits[1] - limits[0]))
-
-
-def _world(light: AreaLight, st: FloatArray) -> FloatArray:
-    origin, u, v = (np.array(a) for a in (light.plane.origin, light.plane.u, light.plane.v))
-    return np.asarray(origin + st[:, :1] * u + st[:, 1:] * v)
-
-
-def _size(light: AreaLight) -> float:
-    corners = control_points(light)
-    return float(np.max(np.linalg.norm(corners - corners.mean(axis=0), axis=1)))
-
-
-def _on_outline(light: AreaLight, u: FloatArray, edge: float = 1.0) -> FloatArray:
-    """Return places (n, 3) on a light's outline, a share ``edge`` of them; others about it."""
-    loops = boundary(light.outline)
-    if not loops:  # it encloses nothing
-        corners = control_points(light)
-        return np.asarray(corners[(u[:, 0] * len(corners)).astype(np.intp)])
-    curves = np.concatenate(loops)
-    st = evaluate(curves[(u[:, 0] * len(curves)).astype(np.intp)], u[:, 1])
-    middle = curves[:, 0].mean(axis=0)
-    off = np.clip((u[:, 2] - edge) / max(1.0 - edge, 1e-9), 0.0, 1.0)[:, None]
-    away = (u[:, 2] >= edge)[:, None]
-    return _world(light, np.where(away, middle + 1.5 * off * (st - middle), st))
-
-
-def _direction(u: FloatArray) -> FloatArray:
-    z, phi = 1.0 - 2.0 * u[:, 0], 2.0 * np.pi * u[:, 1]
-    r = np.sqrt(np.maximum(1.0 - z * z, 0.0))
-    return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
-
-
-def _about(normal: FloatArray, first: FloatArray, angle: FloatArray) -> FloatArray:
-    """Return ``first`` turned about unit normals by angles (n), perpendicular ones assumed."""
-    return np.asarray(
-        np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * np.cross(normal, first)
-    )
-
-
-def _alphas(u: FloatArray, ranges: Ranges) -> FloatArray:
-    """Return alphas (n, 2) from two numbers each."""
-    a = _log(u[:, 0], ranges.alpha)
-    swap = u[:, 1] < 0.5
-    share = np.where(swap, 2.0 * u[:, 1], 2.0 * u[:, 1] - 1.0)
-    b = np.maximum(a * _log(share, (ranges.ratio, 1.0)), ALPHA_MIN)
-    return np.stack([np.where(swap, b, a), np.where(swap, a, b)], axis=-1)
-
-
-def aimed_from(target: FloatArray, position: FloatArray, u: FloatArray, ranges: Ranges) -> Points:
-    """Return points whose lobes point at targets (n, 3), give or take their width.
-
-    That is where errors show. Of ``u`` the last seven numbers are used.
-    """
-    theta, alpha, roll, tangent = u[:, 6], _alphas(u[:, [7, 10]], ranges), u[:, 8], u[:, 11]
-    d = unit(target - position)
-    side = _about(d, across(d, np.zeros(d.shape)), 2.0 * np.pi * roll)
-    t = np.radians(_linear(theta, ranges.theta))
-    n = unit(np.cos(t)[:, None] * d + np.sin(t)[:, None] * side)
-    back = -across(n, np.where(t[:, None] > 1e-6, d, side))
-    off = alpha.max(axis=1) * ndtri(np.clip(u[:, 9], 1e-3, 1.0 - 1e-3))
-    t = np.clip(t + off, 0.0, math.radians(STEEPEST))
-    view = np.cos(t)[:, None] * n + np.sin(t)[:, None] * back
-    return Points.of(position, n, view, alpha, _about(n, back, 2.0 * np.pi * tangent))
-
-
-def aimed(light: AreaLight, ranges: Ranges = Ranges()) -> Placing:
-    """Return points about a light, with lobes that point at it and its outline."""
-
-    def place(u: FloatArray) -> Points:
-        target = _on_outline(light, u, ranges.edge)
-        reach = _size(light) * _log(u[:, 5], ranges.distance)
-        return aimed_from(target, target + _direction(u[:, 3:5]) * reach[:, None], u, ranges)
-
-    return place
-
-
-def beside(light: AreaLight, distance: float, ranges: Ranges = Ranges()) -> Placing:
-    """Return points ``distance`` [m] from the outline in any direction, normals and views any."""
-
-    def place(u: FloatArray) -> Points:
-        position = _on_outline(light, u) + distance * _direction(u[:, 3:5])
-        aim = position + _direction(np.stack([u[:, 5], u[:, 2]], axis=-1))
-        return aimed_from(aim, position, u, ranges)
-
-    return place
-
-
-def on_vertex(light: AreaLight) -> Placing:
-    """Return points on a light's corners and handles."""
-
-    def place(u: FloatArray) -> Points:
-        corners = control_points(light)
-        position = corners[(u[:, 0] * len(corners)).astype(np.intp)]
-        aim = position + _direction(u[:, 3:5])
-        return aimed_from(aim, position, u, Ranges())
-
-    return place
-
-
-def in_plane(light: AreaLight) -> Placing:
-    """Return points in a light's plane, outside its outline: they see it from the edge."""
-
-    def place(u: FloatArray) -> Points:
-        phi = 2.0 * np.pi * u[:, 0]
-        radius = _linear(u[:, 1], (1.5, 5.0))
-        st = radius[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
-        return aimed_from(_on_outline(light, u[:, 2:5]), _world(light, st), u, Ranges())
-
-    return place
-
-
-def behind(light: AreaLight) -> Placing:
-    """Return points behind a light, with lobes that point at it."""
-
-    def place(u: FloatArray) -> Points:
-        target = _on_outline(light, u, 0.5)
-        away = unit(np.cross(light.plane.u, light.plane.v))
-        reach = _log(u[:, 5], (1e-3, 3.0))
-        return aimed_from(target, target - reach[:, None] * away, u, Ranges())
-
-    return place
-
-
-def on_floor(u: FloatArray) -> Points:
-    """Return points of the floor y = 0 within 3 m, with views anywhere above it."""
-    position = np.stack([6.0 * u[:, 0] - 3.0, np.zeros(len(u)), 6.0 * u[:, 1] - 3.0], axis=-1)
-    theta, phi = np.radians(_linear(u[:, 6], (0.0, STEEPEST))), 2.0 * np.pi * u[:, 8]
-    sin = np.sin(theta)
-    view = np.stack([sin * np.cos(phi), np.cos(theta), sin * np.sin(phi)], axis=-1)
-    side = np.stack([np.cos(phi), np.zeros(len(u)), np.sin(phi)], axis=-1)
-    return Points.of(position, (0.0, 1.0, 0.0), view, _log(u[:, 7], (1e-3, 1.0)), side)
-
-
-def along_normal(light: AreaLight, alpha: tuple[float, float]) -> Placing:
-    """Return points whose viewers stand exactly over them."""
-
-    def place(u: FloatArray) -> Points:
-        points = aimed(light, Ranges(alpha, (0.0, 1e-3), ratio=0.1))(u)
-        return replace(points, view=points.normal)
-
-    return place
-
-
-def at_quadrants(light: AreaLight) -> Placing:
-    """Return anisotropic points whose views lie in a plane of symmetry of the lobe, exactly."""
-
-    def place(u: FloatArray) -> Points:
-        points = aimed(light, Ranges((0.01, 1.0), (5.0, 80.0), ratio=0.05))(u)
-        side = across(points.normal, points.view)
-        quarter = np.floor(4.0 * u[:, 11])
-        return replace(points, tangent=_about(points.normal, side, 0.5 * np.pi * quarter))
-
-    return place
-
-
-# --- Series -------------------------------------------------------------------------------
-
-WALL = Plane((0.0, 1.0, -1.5), (1.0, 0.0, 0.0), (0.0, 0.5, 0.0))
-"""Upright behind the origin, half as high as wide, its lower edge .5 m over the floor."""
-
-UP = np.array([0.0, 1.0, 0.0])
-
-
-def _mirrored(position: ArrayLike, normal: ArrayLike, target: ArrayLike) -> FloatArray:
-    d = unit(np.asarray(target, float) - np.asarray(position, float))
-    n = np.asarray(normal, dtype=np.float64)
-    return np.asarray(2.0 * n * np.sum(n * d, axis=-1, keepdims=True) - d)
-
-
-def _sharpening(t: FloatArray) -> Points:
-    """From alpha 1 to .0001, the lobe on the lower edge of a light on the wall."""
-    view = _mirrored((0.0, 0.0, 0.0), UP, (0.1, 0.5, -1.5))
-    return Points.of(np.zeros(3), UP, view, 10.0 ** (-4.0 * t))
-
-
-def _grazing(alpha: float) -> Placing:
-    """View and light sink towards the surface together, from 0 to 89.9 degrees."""
-
-    def place(t: FloatArray) -> Points:
-        d = unit(np.array([0.2, 1.0, -1.5]))
-        side = across(d[None], UP[None])
-        angle = np.radians(STEEPEST * t)[:, None]
-        n = unit(np.cos(angle) * d + np.sin(angle) * side)
-        return Points.of(np.zeros(3), n, _mirrored((0.0, 0.0, 0.0), n, d), alpha)
-
-    return place
-
-
-def _receding(alpha: float) -> Placing:
-    """From .00001 to 100,000 sizes of a light at the origin."""
-
-    def place(t: FloatArray) -> Points:
-        toward = unit(np.array([0.5, 0.2, 1.0]))
-        normal = unit(np.array([0.6, 0.1, 0.3]) - toward)
-        position = 10.0 ** (-5.0 + 10.0 * t)[:, None] * toward + np.array([0.1, 0.05, 0.0])
-        view = 2.0 * normal * (normal @ -toward) + toward
-        return Points.of(position, normal, view, alpha)
-
-    return place
-
-
-def _rising(t: FloatArray) -> Points:
-    """A surface rises past a light that stands upright: it crosses the horizon."""
-    position = np.stack([0.0 * t, 3.0 * t - 1.5, 0.5 + 0.0 * t], axis=-1)
-    return Points.of(position, UP, (0.1, 0.6, 0.8), 0.2)
-
-
-def _through_plane(t: FloatArray) -> Points:
-    """Through the plane of a light, from one side to the other, beside it."""
-    position = np.stack([1.5 + 0.0 * t, 0.2 + 0.0 * t, 0.02 * t - 0.01], axis=-1)
-    normal = unit(np.array([-1.0, 0.1, 0.05]))
-    return Points.of(position, normal, _mirrored(position, normal, (0.5, 0.1, 0.0)), 0.1)
-
-
-def _passing(alpha: float, height: float = 1.2) -> Placing:
-    """Over the floor under a light that hangs there."""
-
-    def place(t: FloatArray) -> Points:
-        position = np.stack([4.0 * t - 2.0, 0.0 * t - height, 0.15 + 0.0 * t], axis=-1)
-        return Points.of(position, UP, (0.2, 0.9, 0.35), alpha)
-
-    return place
-
-
-def _past_edge(t: FloatArray) -> Points:
-    """Past the edge of a light, 1 mm in front of its plane."""
-    position = np.stack([0.98 + 0.04 * t, 0.1 + 0.0 * t, 1e-3 + 0.0 * t], axis=-1)
-    return Points.of(position, (0.3, 0.2, -1.0), (0.1, 0.3, -1.0), 0.1)
-
-
-def _turning(alpha: tuple[float, float]) -> Placing:
-    """The viewer walks once around the point."""
-
-    def place(t: FloatArray) -> Points:
-        phi, theta = 2.0 * np.pi * t, math.radians(50.0)
-        s, c = math.sin(theta), math.cos(theta)
-        view = np.stack([s * np.sin(phi), c + 0.0 * phi, s * np.cos(phi)], axis=-1)
-        a = np.broadcast_to(alpha, (len(t), 2))
-        return Points.of(np.zeros(3), UP, view, a, (0.0, 0.0, 1.0))
-
-    return place
-
-
-def _through_normal(alpha: tuple[float, float]) -> Placing:
-    """The viewer passes over the point, from 5 degrees on one side to 5 on the other."""
-
-    def place(t: FloatArray) -> Points:
-        theta = np.radians(10.0 * t - 5.0)
-        view = np.stack([0.3 * np.sin(theta), np.cos(theta), np.sin(theta)], axis=-1)
-        a = np.broadcast_to(alpha, (len(t), 2))
-        return Points.of(np.zeros(3), (0.0, 0.8, -0.6), view @ _TILT.T, a, (0.6, 0.0, 0.8))
-
-    return place
-
-
-_TILT = np.array([[1.0, 0.0, 0.0], [0.0, 0.8, 0.6], [0.0, -0.6, 0.8]])
-"""Takes +y to the normal of `_through_normal`."""
-
-
-def _through_equal(t: FloatArray) -> Points:
-    """alpha_y from half of alpha_x to twice it."""
-    a = np.stack([0.15 + 0.0 * t, 0.15 * 2.0 ** (2.0 * t - 1.0)], axis=-1)
-    view = _mirrored((0.0, 0.0, 0.0), UP, (0.1, 0.5, -1.5))
-    return Points.of(np.zeros(3), UP, view, a, (0.8, 0.0, 0.6))
-
-
-def _stretching(swap: bool) -> Placing:
-    """From round to a hundred times as long as wide."""
-
-    def place(t: FloatArray) -> Points:
-        a = np.stack([0.4 + 0.0 * t, 0.4 * 10.0 ** (-2.0 * t)], axis=-1)
-        view = _mirrored((0.0, 0.0, 0.0), UP, (0.1, 0.5, -1.5))
-        return Points.of(np.zeros(3), UP, view, a[:, ::-1] if swap else a, (0.8, 0.0, 0.6))
-
-    return place
-
-
-# --- The sweeps ---------------------------------------------------------------------------
-
-
 def _hanging(outline: Outline) -> AreaLight:
     """Return a light at the origin that shines down."""
     return lamp(outline, Plane((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
@@ -393,26 +102,12 @@ def _scaled(light: AreaLight, factor: float) -> AreaLight:
     return replace(light, plane=Plane(light.plane.origin, u, v))  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, slots=True)
-class _Usual:
-    """Lights of the usual kind, in random planes."""
-
-    rng: np.random.Generator
-    lights: dict[str, AreaLight] = field(default_factory=dict)
-
-    def made(self, polygon_count: int, curves: dict[str, Outline]) -> dict[str, AreaLight]:
-        outlines = {f"polygon {i}": random_polygon(self.rng) for i in range(polygon_count)}
-        return {
-            name: lamp(outline, random_plane(self.rng))
-            for name, outline in {**outlines, **curves}.items()
-        }
-
-
 def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
     """Return all sweeps by name; ``seed`` is that of the random lights among them."""
     rng = np.random.default_rng(seed)
     curves = {"heart": heart(), "ampersand": letter("&")}
-    usual = _Usual(rng).made(6, curves)
+    outlines = {f"polygon {i}": random_polygon(rng) for i in range(6)} | curves
+    usual = {name: lamp(outline, random_plane(rng)) for name, outline in outlines.items()}
     square, star, hearts = polygons(SQUARE), polygons(STAR), heart()
     floor_lights = {
         f"{name} at {height:+g}": _upright(outline, height)
@@ -461,8 +156,8 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
             "Roughness from α = 1 to 0.0001, lobes on and about the outline.",
             clouds(usual, lambda x: aimed(x, Ranges((ALPHA_MIN, 1.0), edge=0.7))),
             (
-                Series("sharpening, square", wall, _sharpening),
-                Series("sharpening, heart", heart_wall, _sharpening),
+                Series("sharpening, square", wall, sharpening),
+                Series("sharpening, heart", heart_wall, sharpening),
             ),
         ),
         Sweep(
@@ -470,7 +165,7 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
             "Views from 75° to 89.9° off the normal.",
             clouds(usual, lambda x: aimed(x, Ranges(theta=(75.0, STEEPEST)))),
             tuple(
-                Series(f"grazing, {name}, alpha {alpha:g}", light, _grazing(alpha))
+                Series(f"grazing, {name}, alpha {alpha:g}", light, grazing(alpha))
                 for name, light in (("square", wall), ("heart", heart_wall))
                 for alpha in (0.3, 0.03)
             ),
@@ -483,7 +178,7 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
                 for name, (light, ratio) in sizes.items()
             ),
             tuple(
-                Series(f"receding, {name}, alpha {alpha:g}", light, _receding(alpha))
+                Series(f"receding, {name}, alpha {alpha:g}", light, receding(alpha))
                 for name, light in (
                     ("star", lamp(star, Plane((0, 0, 0)))),
                     ("heart", lamp(hearts, Plane((0, 0, 0)))),
@@ -496,7 +191,7 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
             "Needles, slivers, threads and spikes, 10⁻⁶ to 10⁻³ wide.",
             clouds(thin, aimed),
             tuple(
-                Series(f"passing, {name}", _hanging(THIN[name]), _passing(0.03, 0.05))
+                Series(f"passing, {name}", _hanging(THIN[name]), passing(0.03, 0.05))
                 for name in ("thread", "spike", "comb", "curved needle")
             ),
         ),
@@ -511,11 +206,11 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
                 *clouds({f"in the plane of {n}": x for n, x in near.items()}, in_plane),
             ),
             (
-                Series("rising past a star", _upright(star), _rising),
-                Series("rising past a square", _upright(square), _rising),
-                Series("rising past a ring", _upright(ring()), _rising),
-                Series("through the plane of a star", _upright(star), _through_plane),
-                Series("through the plane of a heart", _upright(hearts), _through_plane),
+                Series("rising past a star", _upright(star), rising),
+                Series("rising past a square", _upright(square), rising),
+                Series("rising past a ring", _upright(ring()), rising),
+                Series("through the plane of a star", _upright(star), through_plane),
+                Series("through the plane of a heart", _upright(hearts), through_plane),
             ),
         ),
         Sweep(
@@ -523,7 +218,7 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
             "Polygons that cross, touch and repeat themselves, with holes, and 1,000 corners.",
             clouds(knots, aimed),
             tuple(
-                Series(f"passing, {name}", _hanging(POLYGONS[name]), _passing(0.1))
+                Series(f"passing, {name}", _hanging(POLYGONS[name]), passing(0.1))
                 for name in ("bow tie", "island in a hole", "pentagram", "frame of a hair")
             ),
         ),
@@ -534,11 +229,11 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
             clouds(stiff, aimed),
             (
                 *(
-                    Series(f"rising past {name}", hard[name], _rising)
+                    Series(f"rising past {name}", hard[name], rising)
                     for name in ("cusp", "loop", "two holes", "ampersand", "raised quadratic")
                 ),
                 *(
-                    Series(f"passing {name}", _hanging(hard[name].outline), _passing(0.1))
+                    Series(f"passing {name}", _hanging(hard[name].outline), passing(0.1))
                     for name in ("wild", "near a cusp", "touching disks")
                 ),
             ),
@@ -555,8 +250,8 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
                 *on_edges,
             ),
             (
-                Series("past the edge of a square", lamp(square, Plane((0, 0, 0))), _past_edge),
-                Series("past the edge of a ring", lamp(ring(), Plane((0, 0, 0))), _past_edge),
+                Series("past the edge of a square", lamp(square, Plane((0, 0, 0))), past_edge),
+                Series("past the edge of a ring", lamp(ring(), Plane((0, 0, 0))), past_edge),
             ),
         ),
         Sweep(
@@ -578,12 +273,12 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
                 *(
                     Series(f"{what}, alpha {a[0]:g} and {a[1]:g}", wall, place(a))
                     for what, place in (
-                        ("turning", _turning),
-                        ("through the normal", _through_normal),
+                        ("turning", turning),
+                        ("through the normal", through_normal),
                     )
                     for a in ((0.1, 0.1), (0.3, 0.05), (0.05, 0.3))
                 ),
-                Series("alphas become equal", wall, _through_equal),
+                Series("alphas become equal", wall, through_equal),
             ),
         ),
         Sweep(
@@ -591,9 +286,9 @@ def make_sweeps(seed: int = 0) -> dict[str, Sweep]:
             "αy from a hundredth of αx to a hundred times it.",
             clouds(usual, lambda x: aimed(x, Ranges((1e-2, 1.0), (0.0, 85.0), ratio=0.01))),
             (
-                Series("stretching across, square", wall, _stretching(False)),
-                Series("stretching along, square", wall, _stretching(True)),
-                Series("stretching, heart", heart_wall, _stretching(False)),
+                Series("stretching across, square", wall, stretching(False)),
+                Series("stretching along, square", wall, stretching(True)),
+                Series("stretching, heart", heart_wall, stretching(False)),
             ),
         ),
     )

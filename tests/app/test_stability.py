@@ -10,11 +10,12 @@ from app.render.techniques import TECHNIQUES, parse_technique
 from app.render.truth import exact_radiance
 from app.scene import ALPHA_MIN, Plane
 from app.stability.bounds import UNBOUNDED, bound_of
+from app.stability.cases import Sampling, cases_of, compared_techniques
+from app.stability.clouds import DIMENSIONS, Ranges, aimed
 from app.stability.definitions import definition_of
 from app.stability.lights import lamp, random_plane, random_polygon
-from app.stability.measure import Sampling, cases_of, compared_techniques
 from app.stability.points import ROUNDING, Points, Seen, certainly_dark, unit
-from app.stability.sweeps import DIMENSIONS, Ranges, aimed, make_sweeps
+from app.stability.sweeps import make_sweeps
 
 SWEEPS = make_sweeps()
 FEW = Sampling(points=1, steps=24)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from app.curves import evaluate, line_as_cubic
+from app.curves import evaluate
 from app.outline import boundary
 from app.presets import disk, ellipse, heart, ring
 from app.render.contour_tree import contour_tree
@@ -21,10 +21,11 @@ from app.scene import (
     PolygonContour,
     RenderSettings,
     Scene,
-    TextSource,
 )
 from app.scene_io import load_scene
-from app.text import text_outline
+from app.stability.lights import STIFF, bezier, letter, moved, wild
+from app.stability.lights import lamp as lamp_of
+from app.stability.lights import random_plane as plane_of
 from ltc.curved_outline import form_factor, ltc_specular, positive_winding
 from ltc.curved_reference import curve_specular_integral_batch
 from ltc.resources import resource_path
@@ -37,15 +38,6 @@ LARGEST, P95 = 5e-4, 1e-4
 thinner, more in grazing views; 5e-5 for 95 of 100, chords being bounded to 1e-4 each."""
 
 
-def bezier(curves: FloatArray) -> BezierContour:
-    """Return a closed contour of curves (k, 4, 2), the last end moved onto the first start."""
-    curves = np.array(curves)
-    curves[:, 3] = np.roll(curves[:, 0], -1, axis=0)
-    return BezierContour(
-        tuple(tuple((float(s), float(t)) for s, t in curve) for curve in curves)  # type: ignore[misc]
-    )
-
-
 def smooth(rng: np.random.Generator, count: int) -> BezierContour:
     """Return a random smooth closed curve about the origin."""
     angle = np.arange(count) * 2.0 * np.pi / count
@@ -55,28 +47,10 @@ def smooth(rng: np.random.Generator, count: int) -> BezierContour:
     return bezier(np.stack([p, p + way, q - q_way, q], axis=1))
 
 
-def wild(rng: np.random.Generator, count: int) -> BezierContour:
-    """Return random curves with cusps, loops and inflections, crossing each other."""
-    angle = np.arange(count) * 2.0 * np.pi / count
-    p = rng.uniform(0.4, 1.2, (count, 1)) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    q = np.roll(p, -1, axis=0)
-    return bezier(
-        np.stack([p, p + rng.normal(0, 0.6, p.shape), q + rng.normal(0, 0.6, p.shape), q], axis=1)
-    )
-
-
-def moved(outline: Outline, s: float, t: float, size: float) -> tuple[BezierContour, ...]:
-    return tuple(bezier(size * loop + (s, t)) for loop in boundary(outline))
-
-
 def two_holes() -> Outline:
     return Outline(
         (*moved(disk(), 0, 0, 1), *moved(disk(), -0.4, 0, 0.3), *moved(heart(), 0.4, 0, 0.25))
     )
-
-
-def letter(text: str) -> Outline:
-    return text_outline(TextSource(text, size=2.0))
 
 
 def logo() -> Outline:
@@ -102,21 +76,6 @@ OUTLINES = {
     "wild, nonzero": lambda: Outline((wild(np.random.default_rng(3), 6),), "nonzero"),
     "square with a round hole": lambda: Outline((SQUARE, *moved(disk(), 0.1, 0, 0.6))),
 }
-
-
-def plane_of(rng: np.random.Generator) -> Plane:
-    u = rng.normal(size=3)
-    v = np.cross(u, rng.normal(size=3)) + 0.3 * rng.normal() * u
-    scale = rng.uniform(0.3, 1.0) / np.linalg.norm(v)
-    return Plane(
-        tuple(rng.uniform(-1.0, 1.0, 3).tolist()),
-        tuple((u / np.linalg.norm(u)).tolist()),
-        tuple((scale * v).tolist()),
-    )
-
-
-def lamp_of(outline: Outline, plane: Plane = Plane(), two_sided: bool = True) -> AreaLight:
-    return AreaLight("l", outline, plane, (1.0, 1.0, 1.0), two_sided)
 
 
 def on_outline(rng: np.random.Generator, lamp: AreaLight, count: int) -> FloatArray:
@@ -311,53 +270,6 @@ def test_close_to_a_curve(renderer, distance, largest):
             # In between lies whether a point this near is in front of the curve or behind.
             wobble = 4.0 * 6e-8 / distance
             assert np.max(np.abs(got - want)) <= largest + wobble
-
-
-def curve(*points: tuple[float, float]) -> FloatArray:
-    return np.array(points, dtype=np.float64)
-
-
-BASE = line_as_cubic((1, 0), (-1, 0))
-TRIANGLE = [line_as_cubic((1, -1), (0, 1)), line_as_cubic((0, 1), (-1, -1))]
-STIFF = {
-    "cusp": [curve((-1, 0), (1, 1), (-1, 1), (1, 0)), BASE],
-    "loop": [curve((-1, 0), (2.5, 1.2), (-2.5, 1.2), (1, 0)), BASE],
-    "closed loop": [curve((0, 0), (2, 2), (-2, 2), (0, 0))],
-    "inflections": [
-        curve((-1, 0), (-0.3, 1.5), (0.3, -1.5), (1, 0)),
-        curve((1, 0), (1, 2), (-1, 2), (-1, 0)),
-    ],
-    "coincident controls": [
-        curve((-1, 0), (-1, 0), (1, 0), (1, 0)),
-        curve((1, 0), (1, 0), (0, 1), (-1, 0)),
-    ],
-    "handles of no length": [
-        curve((-1, 0), (-1, 0), (0, 1), (1, 0)),
-        curve((1, 0), (0.5, -1), (-1, 0), (-1, 0)),
-    ],
-    "a curve of no length": [
-        curve((0, 0), (1, 0), (1, 1), (0, 1)),
-        curve((0, 1), (0, 1), (0, 1), (0, 1)),
-        line_as_cubic((0, 1), (0, 0)),
-    ],
-    "lines as cubics": [line_as_cubic((-1, -1), (1, -1)), *TRIANGLE],
-    "uneven lines": [
-        curve((-1, -1), (-0.9, -1), (0.5, -1), (1, -1)),
-        curve((1, -1), (0.9, -0.8), (0.2, 0.6), (0, 1)),
-        TRIANGLE[1],
-    ],
-    "overshooting line": [curve((-1, -1), (3, -1), (-3, -1), (1, -1)), *TRIANGLE],
-    "raised quadratic": [curve((-1, 0), (-1 / 3, 2 / 3), (1 / 3, 2 / 3), (1, 0)), BASE],
-    "corner without handles": [
-        curve((-0.5, 0), (-0.5, 0), (0, 0), (0, -0.5)),
-        line_as_cubic((0, -0.5), (-0.5, 0)),
-    ],
-    "near a cusp": [
-        curve((-0.8, 0), (-0.2, 0.6), (-0.7, -0.3), (-0.6, -0.9)),
-        line_as_cubic((-0.6, -0.9), (-0.8, 0)),
-    ],
-    "needle": [curve((-1, 0), (-0.3, 1e-4), (0.3, 1e-4), (1, 0)), BASE],
-}
 
 
 @pytest.mark.parametrize("name", STIFF)

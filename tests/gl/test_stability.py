@@ -15,18 +15,11 @@ from hypothesis import strategies as st
 from app.cli.main import run
 from app.render.renderer import Renderer
 from app.render.techniques import TECHNIQUES
-from app.stability.measure import (
-    Case,
-    Row,
-    Sampling,
-    Truth,
-    applies,
-    cases_of,
-    compare,
-    lasting_jump,
-    measure_case,
-)
-from app.stability.sweeps import DIMENSIONS, make_sweeps
+from app.stability.cases import Case, Sampling, applies, cases_of
+from app.stability.clouds import DIMENSIONS
+from app.stability.compare import Truth, compare, lasting_jump
+from app.stability.measure import Row, measure_case
+from app.stability.sweeps import make_sweeps
 from tests.gl.conftest import process_context
 
 SWEEPS = make_sweeps()
