@@ -67,9 +67,10 @@ PANELS = {2: 1e-2, 3: 1e-3, 4: 5e-4, 5: 1e-4, 6: 1e-4}
 """Of curves by nodes a panel: docs/curves.md measures a leaf's largest error, 1e-2, 5.5e-4,
 8e-5, 7e-6 and 7e-7, and certifies chords to 1e-3, 3e-4, 1e-4, 3e-5 and 1e-5; a light has some."""
 
-FAN = {1: 0.16, 2: 0.024, 3: 0.014, 4: 0.008}
-"""Of the mean of G2/G1 on a fan by nodes an edge: the largest errors in `ltc.ggx.ggx_specular`
-and docs/ggx.md, against GGX itself, which is what there is to compare with along curves."""
+FAN = {1: 0.16, 2: 0.024, 3: 0.018, 4: 0.012}
+"""Of the mean of G2/G1 on a fan by nodes an edge, against GGX itself, which is what there is to
+compare with along curves: the largest errors in docs/ggx.md and here, where a lobe of .4 by .02
+seen at 86 degrees errs .0145 with 3 nodes and .0091 with 4."""
 
 STEP = 1e-4
 """A jump that nobody sees: a fortieth of an 8-bit step."""
@@ -129,9 +130,9 @@ RARE = 12.0
 times samples that may be missed."""
 
 SAMPLED = Bound(
-    0.0, DEVIATIONS, 1.0,
-    f"{DEVIATIONS:g} standard errors of the mean, and {RARE:g} over the samples where few carry "
-    "all. Noise jumps",
+    0.0, ROUNDINGS, 1.0,
+    f"besides {DEVIATIONS:g} standard errors of the mean, and {RARE:g} over the samples where few "
+    "carry all. Noise jumps",
 )  # fmt: skip
 
 
@@ -147,6 +148,15 @@ EXCEPTIONS: tuple[Named, ...] = (
             2e-2, ROUNDINGS, 1e-2,
             "Panels of a curve meet within 6e-8 of its length, and what gap is left is felt from a "
             "hundredth of a millimetre on: as 1e-3 there, as 1e-2 a micrometre away.",
+        ),
+    ),
+    Named(
+        ("reference", "ltc+residual"), "distance", False, ("specular",),
+        Bound(
+            0.5, ROUNDINGS, 1.0,
+            "Whether a direction meets a light is decided in the light's plane, in float32: a "
+            "light of 10⁵ times the distance is known to 6e-3 of the distance there, more than "
+            "sharp lobes are wide.",
         ),
     ),
     Named(

@@ -11,6 +11,7 @@ import numpy as np
 from app.render.techniques import Choice, parse_technique
 from app.scene import RenderSettings
 from app.stability.bounds import (
+    DEVIATIONS,
     MOST,
     MOST_ON_OUTLINE,
     QUANTITIES,
@@ -143,12 +144,10 @@ def compare(
         least = max(least, bounds[0].largest)
     lost = (found == 0.0) & (own > least)
     if sampled:
-        largest = largest + RARE / samples
-        moved = deviation
+        largest = largest + RARE / samples + DEVIATIONS * deviation
         lost[:] = False
-    else:
-        moved = truth.jitter(definition, np.any((error > largest) | lost, axis=0))
-        lost &= own > least + 2.0 * roundings * moved
+    moved = truth.jitter(definition, np.any((error > largest) | lost, axis=0))
+    lost &= own > least + 2.0 * roundings * moved
     beyond = np.maximum(error - largest, 0.0)
     used = np.divide(beyond, moved, out=np.where(beyond > 0.0, np.inf, 0.0), where=moved > 0.0)
     excess = error - largest - roundings * moved
