@@ -142,8 +142,12 @@ class LivePicture:
             return
         is_slow = self._full_size_seconds > SLOW
         waits = is_slow and now - self._touched_at < SETTLE and self.samples[0] > 0
-        if shot == self.shot and (waits or self.samples[0] >= settings.samples):
-            return
+        if shot == self.shot:
+            # Whoever now wants fewer samples than there are has all of them.
+            done = self.samples[0]
+            self.samples = (done, max(done, settings.samples))
+            if waits or done >= settings.samples:
+                return
         try:
             began = time.perf_counter()
             samples = self._renderer.accumulate(shot, settings.samples)

@@ -34,12 +34,14 @@ def plan_panel(report: PlanReport) -> None:
 def _plan_row(row: PlanRow) -> None:
     """Draw name and size on a line, the reason beneath, everything else in the tooltip."""
     imgui.begin_group()
-    imgui.text(row.name)
+    imgui.text_wrapped(row.name)
     if row.figure:
         room = imgui.get_content_region_avail().x
         wide = imgui.calc_text_size(row.figure).x
         if imgui.calc_text_size(row.name).x + wide + imgui.get_font_size() < room:
             imgui.same_line(room - wide)  # from where the group starts
+        else:
+            imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + room - wide)
         imgui.text_colored(MUTED, row.figure)
     if row.why:
         em = imgui.get_font_size()

@@ -426,6 +426,9 @@ CASES: dict[str, Case] = {
     "size of zero": bad_arguments(*SHOT, "--size", "0x480", parts=("--size", "1 to 16384")),
     "size negative": bad_arguments(*SHOT, "--size", "-4x4", parts=("--size", "'-4x4'")),
     "size too large": bad_arguments(*SHOT, "--size", "99999x9", parts=("--size", "16384")),
+    "cull nothing": bad_arguments(*SHOT, "--cull", "1/0", parts=("--cull", "1/0", "1/4096")),
+    "cull too much": bad_arguments(*SHOT, "--cull", "1.5", parts=("--cull", "from 0 to 1")),
+    "cull a word": bad_arguments(*SHOT, "--cull", "off", parts=("--cull", "'off'", "1/4096")),
     "no samples": bad_arguments(*SHOT, "--samples", "0", parts=("--samples", "1 to 65536")),
     "no error": bad_arguments(
         *SHOT, "--until-error", "0", parts=("--until-error is '0'", "such as 0.01 or 1%")

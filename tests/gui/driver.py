@@ -488,6 +488,21 @@ def idle_when_nothing_changes(app: Application, out: Path) -> None:
     assert app.window.renderer.lighting_passes > passes
 
 
+def fewer_samples_than_there_are(app: Application, out: Path) -> None:
+    """Wanting fewer samples than were gathered leaves nothing to do, and draws nothing."""
+    window, passes = app.window, app.window.renderer.lighting_passes
+    window.viewport.settings = replace(window.viewport.settings, samples=1)
+    app.settle()
+    assert window.viewport.picture.samples == (SAMPLES, SAMPLES)
+    for _ in range(20):
+        app.frame()
+    assert window.renderer.lighting_passes == passes
+    window.viewport.settings = replace(window.viewport.settings, samples=SAMPLES + 1)
+    app.settle()
+    assert window.viewport.picture.samples == (SAMPLES + 1, SAMPLES + 1)
+    assert window.renderer.lighting_passes == passes + 1
+
+
 def read_the_plan(app: Application, out: Path) -> None:
     """The panel holds what ``explain`` prints, and follows the scene."""
     drawn = []
@@ -660,6 +675,7 @@ SCENARIOS = (
     save_and_open_by_the_dialog,
     same_picture_as_headless,
     idle_when_nothing_changes,
+    fewer_samples_than_there_are,
     read_the_plan,
     export_pictures,
     failures_become_messages,

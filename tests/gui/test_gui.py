@@ -39,6 +39,7 @@ SCENARIOS = (
     "save_and_open_by_the_dialog",
     "same_picture_as_headless",
     "idle_when_nothing_changes",
+    "fewer_samples_than_there_are",
     "read_the_plan",
     "export_pictures",
     "failures_become_messages",
