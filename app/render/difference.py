@@ -114,9 +114,12 @@ class Numbers:
             if noise is not None:
                 values.append((f"{name}'s own noise", noise))
         if any(self.noise):
-            # Of two errors that know nothing of each other the squares add up.
+            # Of two errors that know nothing of each other the squares add up. The noise is no
+            # more than it says of itself, so what is left is at least this.
             noise2 = sum(noise * noise for noise in self.noise if noise is not None)
-            values.append(("RMSE without it", float(np.sqrt(max(self.rmse**2 - noise2, 0.0)))))
+            values.append(
+                ("RMSE beyond it, at least", float(np.sqrt(max(self.rmse**2 - noise2, 0.0))))
+            )
         of_b, of_light = self.mean_b or None, self.light or None
         return [
             (name, value, value / of_b if of_b else None, value / of_light if of_light else None)
