@@ -108,7 +108,8 @@ def _show_the_same(a: Shot, b: Shot) -> bool:
 
 SHORT = {
     "95 % below": "p95", "99 % below": "p99", "largest": "max", "A brighter by": "bias",
-    "A's own noise": "noise of A", "B's own noise": "noise of B", "RMSE beyond it, at least": "beyond it",
+    "A's own noise": "noise of A", "B's own noise": "noise of B",
+    "RMSE beyond it, at least": "beyond it",
 }  # fmt: skip
 """Names of numbers that a narrow panel has room for."""
 
