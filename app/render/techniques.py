@@ -121,8 +121,8 @@ TECHNIQUES: dict[str, Technique] = {
         has_own_diffuse=True,
     ),
     "ltc+residual": Technique(
-        "ltc and an estimate of what it lacks, by random directions: right from the first "
-        "sample, exact in the limit",
+        "ltc and an estimate of what it lacks, by random directions: close after few "
+        "samples, exact in the limit",
         anisotropic=True,
         has_tables=True,
         is_sampled=True,
