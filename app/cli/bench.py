@@ -142,7 +142,8 @@ def bench(
     GPU times come from timer queries. Where those are not to be trusted
     (software rasterisers) every pass is timed by the wall clock instead, and the
     table says so. The row "no shading" shows the scene with materials that
-    reflect nothing: what remains when the integrals are left out.
+    reflect nothing: what remains when the integrals are left out. Pictures of lights are
+    filtered in every frame, as those that play are: the pass "pictures".
 
     --error adds how far each technique is from the integral that it approximates:
     mean, 95th percentile and largest error of specular and diffuse radiance, of
@@ -182,7 +183,9 @@ def bench(
                 steps.done(steps.count + 1)
 
             for job in jobs:
-                measured = measure_in_turn(ctx, renderers, job.shot, warm_up, repeats, one_more)
+                measured = measure_in_turn(
+                    ctx, renderers, job.shot, warm_up, repeats, one_more, new_pictures=True
+                )
                 for one, (passes, wall) in zip(renderers, measured, strict=True):
                     errors, evaluations, held = {}, None, sum(one.allocated().values())
                     share = job.shot.settings.cull

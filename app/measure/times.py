@@ -64,10 +64,12 @@ def measure_in_turn(
     warm_up: int,
     repeats: int,
     on_frame: Callable[[], None] | None = None,
+    new_pictures: bool = False,
 ) -> list[tuple[dict[str, Quartiles], Quartiles]]:
     """Render a shot with several renderers, a frame each in turn.
 
-    What else the machine does then disturbs all alike. Returns for each what
+    What else the machine does then disturbs all alike. With ``new_pictures`` those of
+    lights are filtered in every frame, as those that play are. Returns for each what
     `measure_passes` does.
     """
     times: list[dict[str, list[float]]] = [{} for _ in renderers]
@@ -75,6 +77,8 @@ def measure_in_turn(
     for index in range((warm_up + repeats) * len(renderers)):
         which = index % len(renderers)
         renderer = renderers[which]
+        if new_pictures:
+            renderer.forget_pictures()
         ctx.finish()
         start = time.perf_counter()
         renderer.render(shot)

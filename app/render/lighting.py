@@ -84,9 +84,17 @@ class LightingPass:
         texels = pack_lights(lights, needs.curves, needs.bounded, pictures.records())
         self._lights.update(texels, needs.uniform_texels)
 
-    def set_pictures(self, pictures: PictureLayout) -> bool:
-        """Hold pictures and their blurred levels; return whether anything changed."""
-        return self._pictures.update(pictures)
+    def has_pictures(self, pictures: PictureLayout) -> bool:
+        """Return whether these pictures are held already, and no others."""
+        return self._pictures.holds(pictures)
+
+    def set_pictures(self, pictures: PictureLayout) -> None:
+        """Hold pictures and their blurred levels."""
+        self._pictures.update(pictures)
+
+    def forget_pictures(self) -> None:
+        """Filter pictures again when they are set next."""
+        self._pictures.forget()
 
     def set_materials(self, materials: Sequence[Material], uniform_texels: int) -> None:
         """Hold one record per object."""

@@ -75,29 +75,35 @@ class PictureAtlas:
         texture = self._texture
         return 0 if texture is None else 8 * texture.width * texture.height
 
-    def update(self, layout: PictureLayout) -> bool:
-        """Hold the pictures of a layout and no others; return whether anything changed."""
+    def holds(self, layout: PictureLayout) -> bool:
+        """Return whether the pictures of a layout are held as they are there, and no others."""
+        return self._held.keys() == layout.pictures.keys() and all(
+            self._held[index].is_still(picture) for index, picture in layout.pictures.items()
+        )
+
+    def update(self, layout: PictureLayout) -> None:
+        """Hold the pictures of a layout and no others."""
         if not layout.pictures:
-            changed = self._texture is not None
             self.release()
-            return changed
+            return
         size = (layout.width, layout.height)
         if self._texture is None or self._texture.size != size:
             self.release()
             self._texture = self._ctx.texture(size, 4, dtype="f2")
             self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             self._texture.repeat_x = self._texture.repeat_y = False
-        changed = False
         for index, picture in layout.pictures.items():
             held = self._held.get(index)
             if held is None or not held.is_still(picture):
                 self._fill(picture)
                 self._held[index] = _Held(picture)
                 self.filtered += 1
-                changed = True
         for index in self._held.keys() - layout.pictures.keys():
             del self._held[index]
-        return changed
+
+    def forget(self) -> None:
+        """Fill everything again with the next update."""
+        self._held.clear()
 
     def bind(self, program: moderngl.Program, unit: int) -> None:
         """Make ``program`` read from here, if it reads pictures."""

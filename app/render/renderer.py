@@ -232,7 +232,7 @@ class Renderer:
             self._seen is None
             or self._stale
             or not self._seen.same_radiance(shot)
-            or self._has_new_frames(shot)
+            or self._has_new_frames(shot.settings.time)
             or (limit > 1 and self._needs is not None and not self._needs.lighting.accumulates)
         )
         if restart:
@@ -510,6 +510,10 @@ class Renderer:
         )
         return {"specular": specular, "diffuse": diffuse}
 
+    def forget_pictures(self) -> None:
+        """Filter the lights' pictures again with the next sample, to measure what that takes."""
+        self._lighting.forget_pictures()
+
     def timings(self, *, wait: bool = True) -> dict[str, float]:
         """Return the last time of each pass [ms]: gbuffer, lighting, display, and cpu.
 
@@ -728,19 +732,24 @@ class Renderer:
     def _hold_lights(self, scene: Scene, needs: LightNeeds, time: float) -> None:
         held = self._held_lights
         layout = (needs.curves, needs.bounded, needs.uniform_texels)
+        pictures = NO_PICTURES
         if needs.pictures:
-            pictures = lay_pictures(scene.lights, time, self.limits.texture_side)
-        else:
-            pictures = NO_PICTURES
-        changed = self._lighting.set_pictures(pictures)
+            same = held is not None and held[0] is scene.lights and self._pictures.pictures
+            if same and not self._has_new_frames(time):
+                pictures = self._pictures
+            else:
+                pictures = lay_pictures(scene.lights, time, self.limits.texture_side)
+        changed = not self._lighting.has_pictures(pictures)
+        if changed:
+            with self._timers.measure("pictures"):
+                self._lighting.set_pictures(pictures)
         if held is None or held[0] is not scene.lights or held[1] != layout or changed:
             self._lighting.set_lights(scene.lights, needs, pictures)
             self._held_lights = (scene.lights, layout)
         self._pictures = pictures
 
-    def _has_new_frames(self, shot: Shot) -> bool:
+    def _has_new_frames(self, time: float) -> bool:
         """Return whether a picture would be another one now: it plays, or its file changed."""
-        time = shot.settings.time
         return any(
             picture.light.picture is not None
             and load_frame(picture.light.picture, time) is not picture.frame

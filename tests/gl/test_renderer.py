@@ -239,7 +239,13 @@ def test_display_changes_keep_the_samples(renderer: Renderer) -> None:
 def test_only_what_changed_is_uploaded(renderer: Renderer) -> None:
     scene = one_light()
     renderer.render(shot(scene))
-    assert renderer.uploads == {"meshes": 2, "light shapes": 1, "lights": 1, "materials": 1}
+    assert renderer.uploads == {
+        "meshes": 2,
+        "light shapes": 1,
+        "lights": 1,
+        "materials": 1,
+        "pictures": 0,
+    }
 
     def after(changed: Scene) -> dict[str, int]:
         before = renderer.uploads
