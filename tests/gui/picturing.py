@@ -14,7 +14,7 @@ import numpy as np
 from imgui_bundle import imgui
 from PIL import Image
 
-from app import contours
+from app import contours, lights
 from app.editor import NOTHING, Selection
 from app.scene import Picture
 from tests.gui.application import Application
@@ -70,12 +70,24 @@ def told(app: Application) -> str:
     return "\n".join(message.text for message in app.window.messages.shown)
 
 
+def middle(app: Application) -> str:
+    """Return the colour in the middle of the first light, as it is seen: grey, red, ..."""
+    x, y = app.on_screen(lights.centre_of(app.scene.lights[0]))
+    view = app.window.viewport.view
+    colour = app.picture()[round(y - view.y), round(x - view.x)].astype(int)
+    if colour.max() - colour.min() < 40:
+        return "grey"
+    return ("red", "lime", "blue")[int(colour.argmax())]
+
+
 def drop_pictures(app: Application, out: Path) -> None:
     alone(app)
     before = app.scene
     wide, tall = drawn(out / "wide.png"), drawn(out / "tall.webp", "lime", (10, 30))
+    assert middle(app) == "grey"
     dropped(app, wide)
     assert app.scene.lights[0].picture == Picture(str(wide))
+    assert middle(app) == "red"
     dropped(app, tall, wide)
     assert app.scene.lights[0].picture == Picture(str(tall))
     assert [light.name for light in app.scene.lights] == ["key", "wide"]
@@ -157,8 +169,10 @@ def play_a_picture(app: Application, out: Path) -> None:
     shot = app.window.viewport.picture.shot
     assert shot is not None
     assert shot.settings.time == stopped
-    enter(app, "##moment", 0.3)
-    assert np.isclose(playback.time, 0.3)
+    for moment, colour in ((0.3, "lime"), (0.1, "red"), (0.7, "blue")):
+        enter(app, "##moment", moment)
+        assert np.isclose(playback.time, moment)
+        assert middle(app) == colour
     press(app, "###play")
     app.until(lambda: playback.time > 0.9)
     assert editor.undo_name is None, "playing is no edit"
@@ -178,10 +192,12 @@ def pictures_change_and_go_missing(app: Application, out: Path) -> None:
     app.until(lambda: app.window.viewport.playback.changes > changes)
     app.settle()
     assert shown_picture(app) == picture
+    assert middle(app) == "lime"
     path.unlink()
     app.until(lambda: "there is no such file" in told(app))
     app.settle()
-    assert shown_picture(app) is None, "its light shines plain"
+    assert shown_picture(app) is None
+    assert middle(app) == "grey", "its light shines plain"
     assert app.scene.lights[0].picture == picture
     assert not app.window.viewport.picture.has_failed
     app.window.messages.clear()
