@@ -22,16 +22,18 @@ from app.render.camera import CameraFrame
 from app.render.features import LightingFeatures, LightNeeds, Limits
 from app.render.gbuffer import GBufferPass
 from app.render.lighting import LightingPass
-from app.render.needs import ATTACHMENTS, FORMAT_BYTES, Needs, needs_of
+from app.render.needs import Needs, needs_of
 from app.render.noise import Noise, NoisePass
 from app.render.pack import CurveForm
-from app.render.picking import Hit, Picker, direction_from_octahedral, facing_normal, turned_tangent
+from app.render.picking import Hit, Picker
 from app.render.picture_layout import NO_PICTURES, lay_pictures
 from app.render.plan import Plan, make_plan
 from app.render.post import DisplayPass
 from app.render.programs import Programs
 from app.render.sampling import pixel_offset
-from app.render.state import begin_pass, release_framebuffer
+from app.render.state import begin_pass
+from app.render.surfaces import NO_SURFACES, Surfaces, surfaces_of
+from app.render.targets import Targets
 from app.render.techniques import (
     find_technique,
     parse_technique,
@@ -40,23 +42,6 @@ from app.render.techniques import (
 )
 from app.render.timers import Clock, PassTimers
 from app.scene import Display, PixelView, RenderSettings, Scene, Shot, Vec3
-
-
-@dataclass(frozen=True, eq=False)
-class Surfaces:
-    """Points of the objects that a picture shows, one a pixel, pixels with nothing left out.
-
-    ``position``, ``normal`` and ``view``, (n, 3) float64, are as the lighting pass has
-    them: world space, view and normal unit, the normal bent to face the viewer. ``index``,
-    (n,), counts the scene's objects. ``tangent``, (n, 3), is the material's, unit and
-    perpendicular to the normal; None where the technique shaded without.
-    """
-
-    position: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    view: NDArray[np.float64]
-    index: NDArray[np.int64]
-    tangent: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -88,83 +73,6 @@ _NOISE_OF = {"radiance": "noise", "radiance 2": "noise 2"}
 """Attachments that are written and read together."""
 
 
-class _Targets:
-    """The attachments of one size: made when first asked for, released together."""
-
-    def __init__(self, ctx: moderngl.Context) -> None:
-        self._ctx = ctx
-        self.size = (0, 0)
-        self._textures: dict[str, moderngl.Texture] = {}
-        self._depth: moderngl.Renderbuffer | None = None
-        self._framebuffers: dict[tuple[str, ...], moderngl.Framebuffer] = {}
-
-    def resize(self, size: tuple[int, int]) -> None:
-        if size != self.size:
-            self.release()
-            self.size = size
-
-    def texture(self, name: str) -> moderngl.Texture:
-        if name not in self._textures:
-            try:
-                if name == "display":
-                    texture = self._ctx.texture(self.size, 4)
-                else:
-                    channels = 2 if name == "tangents" else 4
-                    texture = self._ctx.texture(self.size, channels, dtype="f4")
-            except moderngl.Error as error:
-                raise self._too_large(error) from error
-            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self._textures[name] = texture
-        return self._textures[name]
-
-    def framebuffer(self, *names: str, depth: bool = False) -> moderngl.Framebuffer:
-        if names not in self._framebuffers:
-            textures = [self.texture(name) for name in names]
-            try:
-                if depth and self._depth is None:
-                    self._depth = self._ctx.depth_renderbuffer(self.size)
-                self._framebuffers[names] = self._ctx.framebuffer(
-                    color_attachments=textures, depth_attachment=self._depth if depth else None
-                )
-            except moderngl.Error as error:
-                raise self._too_large(error) from error
-        return self._framebuffers[names]
-
-    def _too_large(self, error: moderngl.Error) -> InputError:
-        return InputError(
-            f"size: the graphics driver cannot hold a picture of {self.size[0]}x{self.size[1]} "
-            f"({error}), expected a smaller one"
-        )
-
-    def keep_only(self, names: set[str]) -> None:
-        for name in [n for n in self._textures if n not in names]:
-            for used in [u for u in self._framebuffers if name in u]:
-                release_framebuffer(self._framebuffers.pop(used))
-            self._textures.pop(name).release()
-        if "gbuffer" not in names and self._depth is not None:
-            self._depth.release()
-            self._depth = None
-
-    def allocated(self) -> dict[str, int]:
-        pixels = self.size[0] * self.size[1]
-        held = {name: pixels * FORMAT_BYTES[ATTACHMENTS[name]] for name in self._textures}
-        if self._depth is not None:
-            held["depth"] = pixels * FORMAT_BYTES[ATTACHMENTS["depth"]]
-        return held
-
-    def release(self) -> None:
-        for framebuffer in self._framebuffers.values():
-            release_framebuffer(framebuffer)
-        for texture in self._textures.values():
-            texture.release()
-        if self._depth is not None:
-            self._depth.release()
-        self._framebuffers.clear()
-        self._textures.clear()
-        self._depth = None
-        self.size = (0, 0)
-
-
 class Renderer:
     """Renders shots with one OpenGL context.
 
@@ -193,7 +101,7 @@ class Renderer:
         self._lighting = LightingPass(ctx, self.programs)
         self._display = DisplayPass(ctx, self.programs)
         self._noise = NoisePass(ctx, self.programs)
-        self._targets = _Targets(ctx)
+        self._targets = Targets(ctx)
         self._picker = Picker(ctx)
         self._timers = PassTimers(ctx)
         self._cpu_ms = 0.0
@@ -419,26 +327,9 @@ class Renderer:
             raise RuntimeError("nothing was rendered yet")
         shot = self._seen.shot
         if not self._needs.lighting.lit:
-            none = np.zeros((0, 3))
-            return Surfaces(none, none, none, np.zeros(0, dtype=np.int64))
-        width, height = shot.width, shot.height
-        raw = np.frombuffer(self._targets.texture("gbuffer").read(), dtype=np.float32)
-        pixels = raw.reshape(height, width, 4)[::-1].astype(np.float64)
-        rows, columns = np.nonzero((pixels[..., 2] > 0.0) & (pixels[..., 3] >= 0.0))
-        found = pixels[rows, columns]
-        frame = CameraFrame.of(shot.scene.camera, width / height)
-        x, y = (axis.astype(np.float64) + 0.5 for axis in (columns, rows))
-        ray = frame.ray(x, y, (width, height))
-        view = -ray / np.linalg.norm(ray, axis=-1, keepdims=True)
-        normal = facing_normal(direction_from_octahedral(found[:, :2]), view)
-        index = found[:, 3].astype(np.int64)
-        tangent = None
-        if self._needs.lighting.tangents:
-            raw = np.frombuffer(self._targets.texture("tangents").read(), dtype=np.float32)
-            along = raw.reshape(height, width, 2)[::-1][rows, columns].astype(np.float64)
-            rotations = np.array([m.rotation for m in shot.scene.object_materials()])
-            tangent = turned_tangent(direction_from_octahedral(along), normal, rotations[index])
-        return Surfaces(frame.eye + found[:, 2:3] * ray, normal, view, index, tangent)
+            return NO_SURFACES
+        tangents = self._targets.texture("tangents") if self._needs.lighting.tangents else None
+        return surfaces_of(shot, self._targets.texture("gbuffer"), tangents)
 
     def probe(
         self,
@@ -475,22 +366,10 @@ class Renderer:
         ValueError
             If a shape is wrong.
         """
-        arrays = {}
-        for name, values, width in (
-            ("position", position, 3),
-            ("normal", normal, 3),
-            ("tangent", tangent, 3),
-            ("view", view, 3),
-            ("alpha", alpha, 2),
-        ):
-            array = np.ascontiguousarray(values, dtype=np.float32)
-            if array.ndim != 2 or array.shape[1] != width:
-                raise ValueError(f"{name} has shape {array.shape}, expected (n, {width})")
-            arrays[name] = array
+        arrays = point_arrays(
+            position=position, normal=normal, tangent=tangent, view=view, alpha=alpha
+        )
         count = len(arrays["position"])
-        for name, array in arrays.items():
-            if len(array) != count:
-                raise ValueError(f"{name} has {len(array)} rows, expected {count} as in position")
         alphas = arrays["alpha"]
         if anisotropic is None:
             anisotropic = bool(np.any(alphas[:, 0] != alphas[:, 1]))
@@ -775,6 +654,22 @@ class Renderer:
 def _faint_radiance(shot: Shot) -> float:
     """Return the radiance that all that is skipped may add up to: a share of display white."""
     return float(shot.settings.cull * 2.0**-shot.scene.display.exposure)
+
+
+def point_arrays(**given: ArrayLike) -> dict[str, NDArray[np.float32]]:
+    """Return the inputs of a probe as float32 arrays; raise `ValueError` if shapes are wrong."""
+    arrays = {}
+    for name, values in given.items():
+        width = 2 if name == "alpha" else 3
+        array = np.ascontiguousarray(values, dtype=np.float32)
+        if array.ndim != 2 or array.shape[1] != width:
+            raise ValueError(f"{name} has shape {array.shape}, expected (n, {width})")
+        arrays[name] = array
+    count = len(arrays["position"])
+    for name, array in arrays.items():
+        if len(array) != count:
+            raise ValueError(f"{name} has {len(array)} rows, expected {count} as in position")
+    return arrays
 
 
 def _top_down(texture: moderngl.Texture, dtype: DTypeLike) -> NDArray[Any]:
