@@ -131,10 +131,10 @@ def _place_rows(picture: Picture) -> Picture:
 
 def _mirror_row(mirror: tuple[bool, bool]) -> tuple[bool, bool]:
     label("Mirror", "Swap left and right, or top and bottom")
-    _, across = imgui.checkbox(f"{icons.ICON_FA_ARROWS_ALT_H}###mirror across", mirror[0])
+    _, across = imgui.checkbox("across###mirror across", mirror[0])
     tooltip("Swap left and right")
     imgui.same_line()
-    _, down = imgui.checkbox(f"{icons.ICON_FA_ARROWS_ALT_V}###mirror down", mirror[1])
+    _, down = imgui.checkbox("down###mirror down", mirror[1])
     tooltip("Swap top and bottom")
     return bool(across), bool(down)
 
