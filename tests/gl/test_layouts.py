@@ -92,7 +92,7 @@ vec4 echo(int row, int column)
     return vec4(0.0);
 }
 """
-    got = echo(ctx, tmp_path, storage, needs.defines(), code)
+    got = echo(ctx, tmp_path, storage, {**needs.defines(), "HAS_PICTURES": 0}, code)
     storage.release()
     for i, light in enumerate(LIGHTS):
         geometry = light_geometry(light)
