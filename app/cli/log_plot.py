@@ -92,7 +92,8 @@ def log_plot(
     if len(front) > 1:
         parts.append(Line(front, opacity=0.5, width=1.5, dash=5.0))
     taken = [(x(p.x) - 5.0, y(p.y) - 5.0, x(p.x) + 5.0, y(p.y) + 5.0) for p in points]
-    for point in sorted(points, key=lambda p: not p.on_front):  # the front is labelled first
+    # The front is labelled first, then short names, which are a technique's own.
+    for point in sorted(points, key=lambda p: (not p.on_front, len(p.label))):
         px, py = x(point.x), y(point.y)
         if point.low > 0.0 and point.high > point.low:
             parts.append(Line(((x(point.low), py), (x(point.high), py)), point.colour, 0.5))

@@ -166,6 +166,7 @@ def test_pictures_are_small_and_all_are_shown() -> None:
         for target in re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text("utf-8"))
     }
     pictures = set((ROOT / "docs" / "images").resolve().glob("*"))
+    pictures |= set((ROOT / "docs" / "report").resolve().glob("*.png"))
     assert pictures == shown
     assert all(path.stat().st_size < LARGEST_PICTURE for path in pictures)
     assert {f"{name}.png" for name in demo_scenes()} <= {path.name for path in pictures}

@@ -19,7 +19,7 @@ from app.cli import report_run
 from app.cli.main import run
 from app.cli.report_plots import STYLES, kind_of
 from app.cli.report_run import run_report
-from app.measure.entries import entries_of, parse_entry
+from app.measure.entries import PICTURES, entries_of, parse_entry
 from app.measure.errors import choose_points, exact_truth, lit_evenly, sampled_truth
 from app.scene import RenderSettings, Shot
 from app.scene_io import load_scene
@@ -198,7 +198,8 @@ def test_page_is_whole_and_loads_nothing(made: Path) -> None:
 
 def test_every_technique_has_a_style(made: Path) -> None:
     entries = entries_of(load_scene(made / "disk.json"))
-    assert {kind_of(str(entry)) for entry in entries} == set(STYLES)
+    kinds = {kind_of(str(entry)) for entry in entries}
+    assert kinds | {kind_of(name) for name in PICTURES} == set(STYLES)
     marks = list(STYLES.values())
     assert len(set(marks)) == len(marks)
 
