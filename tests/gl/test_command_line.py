@@ -88,6 +88,30 @@ def test_shot_tells_the_noise_of_random_samples(folder: Path) -> None:
     assert "technique ltc has no noise that would fall, expected --technique" in done.stderr
 
 
+def test_shot_shows_a_moment_and_tells_what_it_changed(folder: Path) -> None:
+    frames = [Image.new("RGB", (4, 4), colour) for colour in ("red", "lime")]
+    frames[0].save(folder / "film.gif", save_all=True, append_images=frames[1:], duration=100)
+    light = {**LIT["lights"][0], "picture": "film.gif"}
+    (folder / "film.json").write_text(json.dumps({**LIT, "lights": [light]}))
+    shot = ("shot", "film.json", "-o", "a.exr", "--size", "32x18", "--samples", "1")
+    for time, shown, dark in (("0", 0, 1), ("0.15", 1, 0), ("0.25", 0, 1)):
+        assert command(folder, *shot, "--time", time).stderr == ""
+        radiance = read_exr(folder / "a.exr")
+        assert radiance[..., shown].max() == pytest.approx(2.0, rel=1e-3)
+        assert radiance[..., dark].max() == 0.0
+    (folder / "film.gif").write_bytes((folder / "film.gif").read_bytes()[:30])
+    assert "lights[0].picture: " in command(folder, *shot, code=2).stderr
+    light["picture"] = "nan.exr"
+    (folder / "film.json").write_text(json.dumps({**LIT, "lights": [light]}))
+    pixels = np.ones((4, 4, 3), dtype=np.float32)
+    pixels[1, 2] = np.nan
+    with OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": pixels}) as file:
+        file.write(str(folder / "nan.exr"))
+    told = command(folder, *shot).stderr
+    assert told == f"{folder / 'nan.exr'}: 1 texel with NaN or infinite numbers became black\n"
+    assert np.isfinite(read_exr(folder / "a.exr")).all()
+
+
 def test_shots_are_reproducible(folder: Path) -> None:
     for name in ("a.png", "b.png"):
         command(folder, "shot", DEMO, "-o", name, "--size", "64x48", "--samples", "2")
