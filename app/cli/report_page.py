@@ -53,8 +53,8 @@ ABOUT = (
 
 ABOUT_PICTURES = (
     f"Where {OTHER} differs most from {STANDARD}: left the picture, right its difference from "
-    f"{STANDARD}, which itself is within a few 1e-4 of GGX; orange is too bright, blue too dark, "
-    f"in full colour at {FULL_COLOUR:.0%} of the crop's median radiance."
+    f"{STANDARD}, which itself is within a few 1e-4 of GGX unless lights have pictures; orange is "
+    f"too bright, blue too dark, in full colour at {FULL_COLOUR:.0%} of the crop's median radiance."
 )
 
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from app.render.renderer import Renderer
 
 STANDARD = "ggx:4"
-"""What pictures are compared with: within a few 1e-4 of GGX on average (docs/ggx.md), and made
-in seconds, where the exact integral of every pixel would take hours."""
+"""What pictures are compared with: within a few 1e-4 of GGX on average (docs/ggx.md) where lights
+have no pictures, and made in seconds, where the exact integral of every pixel would take hours."""
 
 OTHER = "ltc"
 """What differs from it there shows where to look."""
