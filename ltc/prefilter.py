@@ -25,7 +25,7 @@ How
     T_k = .37 G_k + up(.38 G_{k+1} + .25 T_{k+1}), ``up`` bilinear. Beyond the stored area
     arrays go on for four texels, which the widest filter's support never leaves.
 
-Measured with the fetch of `ltc.textured` and five taps, mean error of the shading integral x 1000
+Measured with five taps of least error, mean error of the shading integral x 1000
 (`docs/textures.md`): 3.3; PAD 1/8 or 1/2 with as many texels 3.3, 3.5; level 0 at twice the size
 3.2, at four times 3.2; (.33 .40 .27) or (.30 .42 .28) for the three weights 3.4, 3.5.
 """

@@ -3,8 +3,8 @@
 .venv/bin/python -m docs.figures.textured_fetch
 
 The technique ``ltc`` in float64, without the renderer: a light of 3 m x 2 m with panes in three
-colours stands behind a floor, alpha .03 above and .2 below. About ten minutes, nearly all of them
-for the exact integrals.
+colours stands behind a floor, alpha .03 above and .2 below. About two minutes, nearly all of
+them for the exact integrals.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ltc.textured_reference import CosineLobe, textured_integrals
 FloatArray = NDArray[np.float64]
 
 PICTURE = Path(__file__).parents[1] / "images" / "textures-fetch.png"
-WIDTH, HEIGHT, TEXELS = 200, 108, 48
+WIDTH, HEIGHT, TEXELS = 150, 81, 32
 EYE = np.array([0.0, -1.5, 1.0])
 ALPHAS = (0.03, 0.2)
 

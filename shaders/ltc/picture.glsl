@@ -10,15 +10,15 @@ const float PICTURE_MARGIN = 1.0 / 6.0;
 // How far out taps stand, how wide one among several is, and, by their number, how much of the
 // axis each fills.
 const float PICTURE_REACH = 0.97;
-const float PICTURE_NARROW = 0.78;
+const float PICTURE_NARROW = 0.65;
 #if PICTURE_TAPS <= 1
 const float PICTURE_SPREAD = 0.75;
 #elif PICTURE_TAPS == 3
-const float PICTURE_SPREAD = 0.58;
+const float PICTURE_SPREAD = 0.65;
 #elif PICTURE_TAPS == 5
-const float PICTURE_SPREAD = 0.52;
+const float PICTURE_SPREAD = 0.8;
 #else
-const float PICTURE_SPREAD = 0.46;
+const float PICTURE_SPREAD = 0.75;
 #endif
 
 // The light's plane in cosine space: the point (s, t) is foot + (s - foot_st.s) u + ....

@@ -159,7 +159,7 @@ def test_errors_against_exact_integrals(outline: str, most: float) -> None:
 
     A single tap does not know of a ring's hole but by coverage.
 
-    ``python -m ltc textures`` measures more lights: .23 and .55.
+    ``python -m ltc textures`` measures more lights: .25 and .56.
     """
     measured = measure(configurations=80, seed=3, size=20, pictures=2, outline=outline)
     paper, one, five = (measured.figures(m)[0] for m in ("paper", "1 taps", "5 taps"))
