@@ -35,7 +35,8 @@ for (const head of document.querySelectorAll("table.sortable th"))
     for (const other of head.parentNode.cells) other.removeAttribute("aria-sort");
     head.setAttribute("aria-sort", up ? "ascending" : "descending");
     const key = row => row.cells[column].dataset.value ?? row.cells[column].textContent;
-    const order = (a, b) => column ? key(a) - key(b) : key(a).localeCompare(key(b), "en");
+    const text = (a, b) => key(a).localeCompare(key(b), "en");
+    const order = (a, b) => isNaN(key(a) - key(b)) ? text(a, b) : key(a) - key(b);
     body.append(...[...body.rows].sort((a, b) => up ? order(a, b) : order(b, a)));
   };
 """
@@ -66,7 +67,7 @@ def facts_table(facts: Mapping[str, str]) -> str:
 def sortable_table(heads: Sequence[str], lines: Sequence[str]) -> str:
     """Return a table from plain headings and lines that are ``tr`` elements.
 
-    A cell sorts by its ``data-value``, else by its text; the first column is text.
+    A cell sorts by its ``data-value``, else by its text; numbers as numbers.
     """
     cells = "".join(f'<th scope="col">{escape(head)}</th>' for head in heads)
     return (

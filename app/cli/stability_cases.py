@@ -76,7 +76,10 @@ def write_case(folder: Path, technique: str, worst: Worst, samples: int) -> Case
 
 
 def _with_plate(scene: Scene, points: Points) -> Scene:
-    """Return the scene with a plate at the first of the points, and their viewer's camera."""
+    """Return the scene with a plate at the first of the points, and their viewer's camera.
+
+    The light itself is not drawn: it would often hide the plate.
+    """
     point = points.pick(slice(0, 1))
     p, n, t, view = (a[0] for a in (point.position, point.normal, point.tangent, point.view))
     size = float(np.clip(np.linalg.norm(scene.lights[0].plane.u), *PLATE_SIZES))
@@ -85,7 +88,8 @@ def _with_plate(scene: Scene, points: Points) -> Scene:
     plate = SceneObject("plate", "plane", SURFACE, Transform(_numbers(p), turn, (size,) * 3))
     up = across(view[None], n[None])[0]
     camera = Camera(_numbers(p + size * view), _numbers(p), _numbers(up))
-    return replace(scene, materials=(material,), objects=(plate,), camera=camera)
+    lights = tuple(replace(light, visible=False) for light in scene.lights)
+    return replace(scene, materials=(material,), objects=(plate,), lights=lights, camera=camera)
 
 
 PLATE_SIZES = (0.1, 10.0)

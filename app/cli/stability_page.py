@@ -141,20 +141,26 @@ Line = tuple[str, str, str, str, str, str, str]
 
 def bound_lines() -> list[Line]:
     """Return the table of bounds: technique, light, quantity, largest, roundings, jump, reason."""
-    lines: dict[tuple[str, ...], list[str]] = {}
+    held: dict[tuple[str, ...], dict[str, list[str]]] = {}
     for name in compared_techniques():
         choice = parse_technique(name)
         for curved in (False, True):
             for quantity in QUANTITIES:
                 bound = bound_of(choice, curved, quantity)
                 if bound is not None:
-                    light = "curves" if curved else "polygons"
-                    key = (light, quantity, *_numbers_of(bound))
-                    lines.setdefault(key, []).append(name)
-    return [
-        (", ".join(names), light, quantity, largest, roundings, jump, reason)
-        for (light, quantity, largest, roundings, jump, reason), names in lines.items()
-    ]
+                    key = "curves" if curved else "polygons", *_numbers_of(bound)
+                    held.setdefault(key, {}).setdefault(quantity, []).append(name)
+    lines: list[Line] = []
+    for (light, largest, roundings, jump, reason), names in held.items():
+        # What holds of both lobes of the same techniques is one line.
+        groups: dict[tuple[str, ...], list[str]] = {}
+        for what, some in names.items():
+            groups.setdefault(tuple(some), []).append(what)
+        lines += [
+            (", ".join(some), light, " and ".join(which), largest, roundings, jump, reason)
+            for some, which in groups.items()
+        ]
+    return lines
 
 
 def _numbers_of(bound: Bound) -> tuple[str, str, str, str]:
@@ -262,7 +268,8 @@ def stability_markdown(
         f"{bad['lost_light']} of light lost; "
         f"{sum(row['verdict'] == 'violated' for row in rows)} rows violate a bound. Measured on "
         f"{machine['renderer']}, {settings['points']} points a sweep and {settings['steps']} a "
-        f"series, seed {settings['seed']}. \\* marks a named exception, ! a violation.\n"
+        f"series, seed {settings['seed']}. \\* marks a named exception, ! a violation, ? a "
+        "technique that has no bound.\n"
     )
     for quantity in QUANTITIES:
         parts.append(f"### {quantity.capitalize()}: 99 % of errors below / largest\n")
@@ -281,7 +288,8 @@ def _errors(row: Figures) -> str:
 
 def _used(row: Figures) -> str:
     used = row["roundings"]
-    return f"{'–' if used is None else f'{used:.1f}'} / {number(row['jump'])}"
+    text = "–" if used is None else f"{used:.1f}" if used < 100.0 else "> 99"
+    return f"{text} / {number(row['jump'])}"
 
 
 def _fit(row: Figures) -> str:

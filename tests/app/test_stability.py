@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from app.cli.stability_page import GENERATED, PREAMBLE, bound_lines
 from app.presets import heart
 from app.render.techniques import TECHNIQUES, parse_technique
 from app.render.truth import exact_radiance
 from app.scene import ALPHA_MIN, Plane
-from app.stability.bounds import UNBOUNDED, bound_of
+from app.stability.bounds import EXCEPTIONS, UNBOUNDED, bound_of
 from app.stability.cases import Sampling, cases_of, compared_techniques
 from app.stability.clouds import DIMENSIONS, Ranges, aimed
 from app.stability.definitions import definition_of
@@ -17,6 +20,7 @@ from app.stability.lights import lamp, random_plane, random_polygon
 from app.stability.points import ROUNDING, Points, Seen, certainly_dark, unit
 from app.stability.sweeps import make_sweeps
 
+ROOT = Path(__file__).resolve().parents[2]
 SWEEPS = make_sweeps()
 FEW = Sampling(points=1, steps=24)
 
@@ -141,3 +145,15 @@ def test_points_of_one_row_broadcast():
     assert len(points) == 5
     np.testing.assert_allclose(points.view, np.tile(unit(np.array([1.0, 1.0, 0.0])), (5, 1)))
     np.testing.assert_allclose(points.tangent, np.tile([1.0, 0.0, 0.0], (5, 1)), atol=1e-15)
+
+
+def test_the_page_of_the_docs_is_of_these_sweeps_and_bounds():
+    """It is a copy of what the command writes; measured numbers may be older than the code."""
+    text = (ROOT / "docs" / "stability.md").read_text("utf-8")
+    for sweep in SWEEPS.values():
+        assert f"| `{sweep.name}` | {sweep.about} |" in text
+    for item in EXCEPTIONS:
+        assert item.bound.reason in text, f"run '{GENERATED}' and copy its stability.md to docs/"
+    for line in bound_lines():
+        assert line[-1] in text
+    assert PREAMBLE in text
