@@ -14,6 +14,7 @@ PASS_NAMES = {
     "gbuffer": "G-buffer",
     "lighting": "Lighting",
     "display": "Display",
+    "pictures": "Pictures",
     "cpu": "CPU, submitting",
 }
 
@@ -48,8 +49,10 @@ class Reports:
 
 def _other_needs(a: Shot, b: Shot) -> bool:
     """Tell whether a plan for ``a`` may not be true for ``b``."""
+    # Every frame of a film is as large as the others.
+    settings = replace(a.settings, time=b.settings.time)
     return (
-        (a.width, a.height, a.settings) != (b.width, b.height, b.settings)
+        (a.width, a.height, settings) != (b.width, b.height, b.settings)
         or a.scene.lights is not b.scene.lights
         or a.scene.objects is not b.scene.objects
         or a.scene.materials is not b.scene.materials
