@@ -36,6 +36,7 @@ from app.scene import (
     Outline,
     Plane,
     PolygonContour,
+    RenderSettings,
     Scene,
     SceneObject,
     Transform,
@@ -75,7 +76,7 @@ HIDDEN = replace(SCENE.lights[0], visible=False)
 def start(app: Application) -> None:
     """Bring the application back to the first scene, its light selected."""
     app.window.show(SCENE, None)
-    app.window.viewport.settings = replace(app.window.viewport.settings, samples=SAMPLES)
+    app.window.viewport.settings = RenderSettings(samples=SAMPLES)
     app.window.viewport.tool = "move"
     app.window.editor.selection = Selection.light(0)
     app.act(lambda ctx: ctx.mouse_move_to_pos(imgui.ImVec2(5.0, 695.0)))
